@@ -1,0 +1,63 @@
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "urban_gnss_localization/control/waypoint_controller.hpp"
+#include "urban_gnss_localization/filters/bias_kalman_filter.hpp"
+#include "urban_gnss_localization/filters/particle_filter.hpp"
+#include "urban_gnss_localization/simulation/paper_field.hpp"
+
+namespace urban_gnss {
+
+/// Everything that the simulation of section 4 depends on.
+struct PaperExperimentConditions {
+  PaperFieldParameters field;
+  MotionParameters field_motion;      ///< of the robot
+  MotionParameters filter_motion;     ///< that the filters assume
+  GpsBiasParameters bias;
+  ParticleFilterParameters filter;
+  WaypointControllerParameters controller;
+  int laps{3};
+  bool closed_loop{true};  ///< steer on the estimate; otherwise on the truth
+};
+
+/// A way to estimate the pose, by the name that tables and files use.
+struct PaperMethod {
+  enum class Kind {
+    kFilter,
+    kDeadReckoning,  ///< the inputs alone
+    kOracleZone,     ///< knows the zone: drops the fix in the shadow
+    kOracle,         ///< knows zone and bias: takes the bias off and uses the right noise
+  };
+  std::string name;
+  Kind kind{Kind::kFilter};
+  std::string description;
+  std::function<void(PaperExperimentConditions&)> configure;  ///< what differs from the conditions
+};
+
+/// Every method that the experiment knows.
+const std::vector<PaperMethod>& paper_methods();
+
+/// One step of one run: what was true, what was measured, what was believed.
+struct PaperStep {
+  double time_s{0.0};
+  int lap{0};
+  Pose2 truth;
+  Pose2 estimate;
+  SimulatedFix fix;
+  double radius_m{0.0};
+  double effective_sample_size{0.0};
+  double cross_track_m{0.0};  ///< distance of the truth from the polygon of the targets
+};
+
+/// Called after each step; `particles` is empty for methods without.
+using PaperObserver = std::function<void(const PaperStep&, const ParticleSet* particles)>;
+
+/// Drives the robot for `conditions.laps` rounds, or for half as long again as that takes along the ring at constant
+/// speed, with one method. Everything random follows from field.seed and filter.seed.
+void run_paper_experiment(const PaperMethod& method, PaperExperimentConditions conditions,
+                          const PaperObserver& observer);
+
+}  // namespace urban_gnss

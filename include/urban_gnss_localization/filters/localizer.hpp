@@ -1,0 +1,61 @@
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <string>
+
+#include "urban_gnss_localization/geometry/pose2.hpp"
+#include "urban_gnss_localization/gnss/fix.hpp"
+#include "urban_gnss_localization/gnss/fix_decision.hpp"
+#include "urban_gnss_localization/motion/motion_model.hpp"
+
+namespace urban_gnss {
+
+/// A fix at the moment it enters a filter.
+struct FixMeasurement {
+  Eigen::Vector2d position{Eigen::Vector2d::Zero()};  ///< m, map frame
+  Eigen::Matrix2d covariance{Eigen::Matrix2d::Identity()};  ///< m^2
+  /// Where the antenna was at the fix's stamp, seen from the base as it stands now (m): lever arm and lateness in one.
+  Eigen::Vector2d antenna_in_body{Eigen::Vector2d::Zero()};
+  double bias_radius_m{0.0};  ///< r-hat, where a bias filter gave one
+  double time_s{0.0};         ///< of the fix, since any fixed instant
+};
+
+/// How sure a localizer is of what it publishes. NaN and 0 where a method has no such number.
+struct LocalizerHealth {
+  double heading_sigma_rad{std::numeric_limits<double>::quiet_NaN()};  ///< circular standard deviation
+  std::uint32_t particle_count{0};
+  double effective_sample_size{std::numeric_limits<double>::quiet_NaN()};
+  double position_spread_m{std::numeric_limits<double>::quiet_NaN()};
+  double cluster_mass{std::numeric_limits<double>::quiet_NaN()};
+  std::uint32_t cluster_count{0};
+};
+
+/// A pose filter of odometry and fixes in the map frame. It knows no clock and no message: the pipeline calls it in the
+/// order of the stamps.
+class Localizer {
+ public:
+  virtual ~Localizer() = default;
+
+  virtual const char* name() const = 0;
+  virtual std::string mode() const = 0;
+
+  /// Whether it makes use of a bias filter's radius, so that a fix should wait for it.
+  virtual bool wants_bias() const = 0;
+
+  /// Starts anew, the random numbers too, at a pose with covariance (m^2, m rad, rad^2).
+  virtual void initialize(const PoseEstimate& start) = 0;
+
+  /// Moves by one step of odometry.
+  virtual void move(const Twist2& twist, double duration_s) = 0;
+
+  /// Takes one fix. The verdict carries the decision with its NIS.
+  virtual FixVerdict correct(const FixMeasurement& fix) = 0;
+
+  virtual Pose2 pose() const = 0;
+  /// The pose with its covariance.
+  virtual PoseEstimate estimate() const = 0;
+  virtual LocalizerHealth health() const = 0;
+};
+
+}  // namespace urban_gnss

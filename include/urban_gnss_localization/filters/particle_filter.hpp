@@ -1,0 +1,115 @@
+#pragma once
+
+#include <cstdint>
+
+#include "urban_gnss_localization/filters/estimation.hpp"
+#include "urban_gnss_localization/filters/fix_likelihood.hpp"
+#include "urban_gnss_localization/filters/localizer.hpp"
+#include "urban_gnss_localization/filters/resampling.hpp"
+#include "urban_gnss_localization/filters/sampling.hpp"
+
+namespace urban_gnss {
+
+enum class ParticleFilterMode {
+  kLiteral,       ///< the text as printed
+  kPaper,         ///< its reading that works
+  kConventional,  ///< eq. (46), (47): motion proposal, direct likelihood
+};
+EnumNames<ParticleFilterMode> enum_names(ParticleFilterMode);
+
+/// A choice that the mode makes unless it is made explicitly.
+enum class LikelihoodChoice { kAuto, kPrinted, kSum, kProduct };
+enum class Switch { kAuto, kOn, kOff };
+enum class EstimateMethod { kMean, kHeaviestCluster };
+EnumNames<LikelihoodChoice> enum_names(LikelihoodChoice);
+EnumNames<Switch> enum_names(Switch);
+EnumNames<EstimateMethod> enum_names(EstimateMethod);
+
+struct ParticleFilterParameters {
+  ParticleFilterMode mode{ParticleFilterMode::kPaper};
+  int particle_count{1000};                        ///< M
+  double ring_share{0.05};                         ///< share of particles drawn on the ring, eq. (22)
+  LikelihoodChoice likelihood{LikelihoodChoice::kAuto};  ///< auto: printed (literal, conventional) or product (paper)
+  Switch use_gps_heading{Switch::kAuto};           ///< theta_GPS, eq. (12); auto: with the sums, not with the product
+  bool use_fix_covariance{true};                   ///< Sigma_b from each fix instead of direct_sigma
+  double direct_sigma{3.0};                        ///< m, sigma_b
+  double shadow_sigma{3.0};                        ///< m, sigma_s
+  double gps_heading_sigma{0.1};                   ///< rad, sigma_p
+  double ess_threshold{5.0};                       ///< resampling below this effective sample size, eq. (39)
+  ResamplingScheme resampling{ResamplingScheme::kMultinomial};
+  EstimateMethod estimate{EstimateMethod::kHeaviestCluster};
+  double cluster_cell{1.0};                        ///< m, particles within one to two cells belong together
+  double gate_probability{0.99};                   ///< conventional mode: gate on the NIS; 1 switches it off
+  double gate_timeout{5.0};                        ///< s of nothing but rejections after which it restarts on the fix
+  int seed{1};
+
+  template <class V>
+  void visit(V& v) {
+    v("mode", mode);
+    v("particle_count", particle_count, between(1, 1000000));
+    v("ring_share", ring_share, between(0.0, 1.0));
+    v("likelihood", likelihood);
+    v("use_gps_heading", use_gps_heading);
+    v("use_fix_covariance", use_fix_covariance);
+    v("direct_sigma", direct_sigma, positive());
+    v("shadow_sigma", shadow_sigma, positive());
+    v("gps_heading_sigma", gps_heading_sigma, positive());
+    v("ess_threshold", ess_threshold, non_negative());
+    v("resampling", resampling);
+    v("estimate", estimate);
+    v("cluster_cell", cluster_cell, positive());
+    v("gate_probability", gate_probability, Range{0.0, 1.0, true});
+    v("gate_timeout", gate_timeout, positive());
+    v("seed", seed, any_number());
+  }
+  void check(std::vector<std::string>& faults) const;
+
+  /// What `auto` stands for in this mode.
+  LikelihoodForm likelihood_form() const;
+  bool uses_gps_heading() const;
+};
+
+/// The particle filter of Nishida et al., Algorithm 1: sample, weigh, estimate, resample.
+class ParticleFilter : public Localizer {
+ public:
+  /// Requires parameters without faults.
+  ParticleFilter(const ParticleFilterParameters& parameters, const MotionParameters& motion);
+
+  const char* name() const override { return "particle_filter"; }
+  std::string mode() const override { return enum_name(parameters_.mode); }
+  bool wants_bias() const override { return parameters_.mode != ParticleFilterMode::kConventional; }
+  void initialize(const PoseEstimate& start) override;
+  void move(const Twist2& twist, double duration_s) override;
+  FixVerdict correct(const FixMeasurement& fix) override;
+  Pose2 pose() const override { return estimate_; }
+  PoseEstimate estimate() const override;
+  LocalizerHealth health() const override;
+
+  const ParticleSet& particles() const { return particles_; }
+  /// Before resampling, at the last fix.
+  double effective_sample_size() const { return effective_sample_size_; }
+
+ private:
+  FixLikelihood likelihood_of(const FixMeasurement& fix) const;
+  Pose2 posterior_mean();
+  void examine(const FixMeasurement& fix, FixVerdict& verdict) const;
+  bool is_gated(const FixMeasurement& fix, FixVerdict& verdict);
+
+  ParticleFilterParameters parameters_;
+  MotionParameters motion_;
+  double nis_threshold_;
+  RandomEngine engine_;
+  ParticleSet particles_;
+  RingSampler ring_;
+  Resampler resampler_;
+  ParticleClusters clusters_;
+
+  Pose2 estimate_;  ///< x_est of the last fix, moved without noise since: f(x_est, u) of eq. (23)
+  Eigen::Vector2d last_fix_position_{Eigen::Vector2d::Zero()};  ///< estimated position at the last fix, for eq. (12)
+  double turn_since_fix_{0.0};                                  ///< rad, for eq. (12)
+  double effective_sample_size_{0.0};                           ///< before resampling
+  double last_accepted_time_s_{0.0};
+  bool had_fix_{false};
+};
+
+}  // namespace urban_gnss

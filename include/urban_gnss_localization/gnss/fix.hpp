@@ -1,0 +1,36 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+
+#include "urban_gnss_localization/common/stamp.hpp"
+
+namespace urban_gnss {
+
+/// A position on the WGS-84 ellipsoid: degrees, metres above the ellipsoid.
+struct GeodeticPosition {
+  double latitude_deg{0.0};
+  double longitude_deg{0.0};
+  double altitude_m{0.0};
+};
+
+/// How far a receiver says its covariance can be trusted (sensor_msgs/NavSatFix::position_covariance_type).
+enum class CovarianceType { kUnknown, kApproximated, kDiagonalKnown, kKnown };
+
+/// A fix as a receiver reports it, nothing checked.
+struct RawFix {
+  Stamp stamp{0};
+  bool has_fix{true};
+  GeodeticPosition position;
+  Eigen::Matrix3d covariance{Eigen::Matrix3d::Zero()};  ///< ENU, m^2
+  CovarianceType covariance_type{CovarianceType::kUnknown};
+};
+
+/// A fix in the map frame that passed sanitation: finite, with a positive definite covariance.
+struct LocalFix {
+  Stamp stamp{0};
+  Eigen::Vector2d position{Eigen::Vector2d::Zero()};      ///< east, north of the datum, m
+  Eigen::Matrix2d covariance{Eigen::Matrix2d::Identity()};  ///< m^2
+};
+
+}  // namespace urban_gnss

@@ -1,0 +1,66 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "urban_gnss_localization/common/parameters.hpp"
+#include "urban_gnss_localization/geometry/local_frame.hpp"
+#include "urban_gnss_localization/gnss/fix.hpp"
+#include "urban_gnss_localization/gnss/fix_decision.hpp"
+
+namespace urban_gnss {
+
+/// What is believed of a receiver's own covariance, and how far from the datum a fix may lie.
+struct FixSanitationParameters {
+  /// m, standard deviation per horizontal axis where a fix declares no covariance that can be used
+  double fix_sigma_default{5.0};
+  /// m, smallest standard deviation that is believed; receivers declare millimetres, or degrees squared
+  double fix_sigma_floor{0.3};
+  /// m, largest standard deviation that is kept; beyond it a fix says nothing
+  double fix_sigma_ceiling{200.0};
+  /// factor on the declared covariance (a variance, not a standard deviation), before floor and ceiling
+  double fix_covariance_scale{1.0};
+  /// m, a fix farther from the datum is rejected
+  double max_distance_from_datum{100000.0};
+
+  template <class V>
+  void visit(V& v) {
+    v("fix_sigma_default", fix_sigma_default, positive());
+    v("fix_sigma_floor", fix_sigma_floor, positive());
+    v("fix_sigma_ceiling", fix_sigma_ceiling, positive());
+    v("fix_covariance_scale", fix_covariance_scale, positive());
+    v("max_distance_from_datum", max_distance_from_datum, positive());
+  }
+  void check(std::vector<std::string>& faults) const;
+};
+
+/// A fix after sanitation. Where is_rejected(verdict.decision), `fix` holds nothing but the stamp.
+struct SanitizedFix {
+  LocalFix fix;
+  FixVerdict verdict;
+};
+
+/// The part of sanitation that needs neither datum nor history: in this order, the receiver has a fix (else
+/// kRejectedStatus); latitude and longitude are finite (else kRejectedNonFinite); the stamp is not negative, they name
+/// a place, and are not both exactly 0, which is what receivers report before they know (else kRejectedOutOfRange).
+bool is_usable_position(const RawFix& raw);
+
+/// Decides whether a fix can be used at all, and brings it to the map frame with a covariance that can be worked with.
+/// Finite and positive definite for every possible input; never throws on account of one.
+///
+/// The first check that fails decides: those of is_usable_position() in their order, then the stamp is newer than
+/// `last_stamp` (else kRejectedStale), then the distance from the datum (else kRejectedOutOfRange). An altitude that no
+/// receiver on the ground can have does not reject a horizontal fix: the datum's is used.
+///
+/// The covariance is the declared horizontal block times `fix_covariance_scale`; its off-diagonal elements are not
+/// declared, and not used, where the type is kDiagonalKnown. Where the type is kUnknown, or the block is not finite or
+/// not positive definite (all zero, say), it is that of `fix_sigma_default`. Else the axes of its ellipse are clamped
+/// to the floor and the ceiling, each in its own direction. The decision is kInflated where the default or the floor was
+/// used, else kAccepted; verdict.covariance_clamped tells of all three.
+///
+/// `last_stamp` is the stamp of the fix handled last, nothing at the start. Requires parameters without faults.
+SanitizedFix sanitize_fix(const RawFix& raw, const LocalFrame& frame, std::optional<Stamp> last_stamp,
+                          const FixSanitationParameters& parameters);
+
+}  // namespace urban_gnss

@@ -1,0 +1,109 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <deque>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "urban_gnss_localization/common/parameters.hpp"
+#include "urban_gnss_localization/geometry/pose2.hpp"
+#include "urban_gnss_localization/gnss/fix.hpp"
+
+namespace urban_gnss {
+
+/// When the heading found from motion is good enough, and when not to wait for it any longer.
+struct HeadingInitializerParameters {
+  /// rad, standard deviation of the yaw below which there is an initial pose
+  double initialization_heading_sigma{0.2};
+  /// s, time from the first fix after which the caller should do without a heading
+  double initialization_timeout{60.0};
+  /// s, time for which fixes are remembered: as long as odometry's own drift is small beside the fixes' errors
+  double initialization_window{60.0};
+
+  template <class V>
+  void visit(V& v) {
+    v("initialization_heading_sigma", initialization_heading_sigma, Range{0.0, 1.0, true});
+    v("initialization_timeout", initialization_timeout, positive());
+    v("initialization_window", initialization_window, positive());
+  }
+  void check(std::vector<std::string>& faults) const;
+};
+
+/// The initial pose from motion alone, without a magnetometer: the rotation and translation that lay the path of
+/// the odometry on the fixes in the sense of least squares.
+///
+/// 1. Every fix is remembered with the odometry's pose at the fix's own stamp, for `initialization_window`.
+/// 2. A Cauchy-weighted alignment, whose scale is the median residual, tells which fixes agree with each other; one that
+///    is a kilometre off has no say.
+/// 3. The alignment is repeated over the fixes that agree, each weighted by 1 / its declared variance per axis.
+/// 4. With s² the larger of the declared and the residual variance per axis, the yaw's variance is s² / (sum of squared
+///    lever arms about the centroid), and the centroid's s² / n.
+///
+/// The errors of the fixes are taken as independent of each other. A bias that they share is not seen; it stays in
+/// the position and is not in the covariance.
+class HeadingInitializer {
+ public:
+  /// Requires parameters without faults.
+  explicit HeadingInitializer(HeadingInitializerParameters parameters);
+
+  /// `odometry_pose_at_fix` is the pose in the odometry's frame, at the fix's stamp, of the point whose position the
+  /// fix is: the base, or the antenna if its offset is composed with the base's pose. Ignored where something is not finite,
+  /// the odometry is absurdly far from its origin (1e8 m), the variance is not positive or the stamp is not newer than
+  /// the last.
+  void add(const Pose2& odometry_pose_at_fix, const LocalFix& fix);
+
+  /// The pose in the map frame, of the same point as in add(), at the last fix's stamp; its position is the alignment's,
+  /// not that fix's. Nothing until the yaw's standard deviation is below the limit, at least 4 fixes agree, and the
+  /// robot has been farther than 2 s from where the window begins (a distance, not a length of path: the jitter of a
+  /// parked robot's odometry adds up to a long path).
+  std::optional<PoseEstimate> estimate() const;
+
+  /// A start without a heading: the position at the last fix, yaw 0 with the variance of a uniform one (pi²/3). The
+  /// position is that of the latest fix that agrees with the others, and its covariance is enlarged by the way travelled
+  /// since then; where fewer than 4 agree it is that of the last fix. Throws std::logic_error where there is no fix.
+  PoseEstimate without_heading() const;
+
+  /// The fixes since start or reset span `initialization_timeout`.
+  bool timed_out() const;
+
+  /// Forgets every fix, and starts the time-out anew.
+  void reset();
+
+  /// What is missing, for people, e.g. "heading: moved 2.1 of 10.0 m"; empty where there is an estimate.
+  std::string waiting_for() const;
+
+ private:
+  struct Sample {
+    Pose2 odometry;
+    LocalFix fix;
+    double information;  ///< 1 / m^2, 1 / mean variance of the fix per axis
+  };
+  struct Alignment {
+    Eigen::Vector2d odometry_centroid;
+    Eigen::Vector2d map_centroid;
+    double yaw;                ///< rad, of the odometry's frame in the map frame
+    double information;        ///< 1 / m^2, sum of the weights
+    double lever_information;  ///< sum of the weights times squared lever arms (dimensionless)
+  };
+  /// An alignment over the samples that agree.
+  struct Consensus {
+    Alignment alignment;
+    std::size_t count;         ///< samples that agree
+    std::size_t latest;        ///< index of the last of these
+    double noise_sigma;        ///< m, the s above
+    double position_variance;  ///< m^2, per axis, of the centroid
+    double yaw_variance;       ///< rad^2
+  };
+  Alignment align(const std::vector<double>& weights) const;
+  std::vector<double> normalised_residuals(const Alignment& alignment) const;
+  std::optional<Consensus> consensus() const;
+  double distance_moved() const;
+  bool is_converged(const Consensus& found) const;
+
+  HeadingInitializerParameters parameters_;
+  std::deque<Sample> samples_;
+  std::optional<Stamp> first_stamp_;
+};
+
+}  // namespace urban_gnss

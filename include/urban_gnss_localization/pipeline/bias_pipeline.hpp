@@ -1,0 +1,75 @@
+#pragma once
+
+#include <deque>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "urban_gnss_localization/filters/bias_kalman_filter.hpp"
+#include "urban_gnss_localization/gnss/fix_sanitation.hpp"
+#include "urban_gnss_localization/motion/odometry_history.hpp"
+#include "urban_gnss_localization/pipeline/stamp_monitor.hpp"
+
+namespace urban_gnss {
+
+struct BiasPipelineParameters {
+  std::vector<double> antenna_offset{0.0, 0.0};  ///< m, x and y of the antenna in the base frame
+  double estimate_timeout{0.2};  ///< s after a fix at which odometry alone carries the last estimate to it
+  double time_jump{1.0};         ///< s, a stamp older by more than this is a clock that was set back
+  bool reset_on_time_jump{true};
+  FixSanitationParameters fix;
+  GpsBiasParameters bias;
+
+  template <class V>
+  void visit(V& v) {
+    v("antenna_offset", antenna_offset);
+    v("estimate_timeout", estimate_timeout, non_negative());
+    v("time_jump", time_jump, positive());
+    v("reset_on_time_jump", reset_on_time_jump);
+    fix.visit(v);
+    bias.visit(v);
+  }
+  void check(std::vector<std::string>& faults) const;
+};
+
+/// Everything between the messages and the bias filter: the fix is compared with the localizer's estimate, carried to
+/// the fix's stamp by the odometry.
+class BiasPipeline {
+ public:
+  /// Requires parameters without faults.
+  explicit BiasPipeline(const BiasPipelineParameters& parameters);
+
+  void set_datum(const GeodeticPosition& datum);
+  void add_odometry(const OdometrySample& sample);
+  /// The localizer's estimate of the base in the map frame.
+  void add_estimate(Stamp stamp, const Pose2& pose);
+  void add_fix(const RawFix& fix);
+  void reset(const std::string& why);
+
+  /// One estimate a fix, rejected fixes included.
+  std::vector<BiasEstimate> take_estimates();
+  std::vector<PipelineEvent> take_events();
+  /// What is missing, for people; empty where nothing is.
+  std::string waiting_for() const;
+
+ private:
+  bool process_next_fix();
+  std::optional<Pose2> pose_at(Stamp stamp) const;
+  bool jumped(StampMonitor& monitor, Stamp stamp, const char* stream);
+  void reject(const FixVerdict& verdict);
+
+  BiasPipelineParameters parameters_;
+  BiasTracker tracker_;
+  std::optional<LocalFrame> frame_;
+  OdometryHistory history_;
+  StampMonitor odometry_stamps_;
+  StampMonitor estimate_stamps_;
+  StampMonitor fix_stamps_;
+  std::deque<std::pair<Stamp, Pose2>> poses_;
+  std::deque<SanitizedFix> pending_;
+  std::optional<Stamp> last_fix_stamp_;
+  std::vector<BiasEstimate> estimates_;
+  std::vector<PipelineEvent> events_;
+};
+
+}  // namespace urban_gnss

@@ -1,0 +1,196 @@
+#pragma once
+
+#include <deque>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "urban_gnss_localization/filters/bias_kalman_filter.hpp"
+#include "urban_gnss_localization/filters/localizer.hpp"
+#include "urban_gnss_localization/gnss/datum_initializer.hpp"
+#include "urban_gnss_localization/gnss/fix_sanitation.hpp"
+#include "urban_gnss_localization/gnss/heading_initializer.hpp"
+#include "urban_gnss_localization/motion/odometry_history.hpp"
+#include "urban_gnss_localization/pipeline/stamp_monitor.hpp"
+
+namespace urban_gnss {
+
+struct LocalizationParameters {
+  std::vector<double> initial_pose;        ///< m, m, rad in the map frame; empty: from fixes and motion
+  double initial_position_sigma{1.0};      ///< m, of initial_pose
+  double initial_heading_sigma{0.2};       ///< rad, of initial_pose
+  std::vector<double> antenna_offset{0.0, 0.0};  ///< m, x and y of the antenna in the base frame
+  bool use_imu_yaw_rate{false};            ///< the IMU's yaw rate in place of the odometry's, where there is one
+  double odometry_gap{2.0};                ///< s without odometry after which the robot's place is unknown
+  double fix_timeout{10.0};                ///< s without a fix that was used after which this is dead reckoning
+  double bias_timeout{0.5};                ///< s that a fix waits for its gps/bias
+  double time_jump{1.0};                   ///< s, a stamp older by more than this is a clock that was set back
+  bool reset_on_time_jump{true};
+  double heading_converged_sigma{0.3};     ///< rad, heading is said to be known below this
+  DatumParameters datum;
+  FixSanitationParameters fix;
+  HeadingInitializerParameters heading;
+
+  template <class V>
+  void visit(V& v) {
+    v("initial_pose", initial_pose);
+    v("initial_position_sigma", initial_position_sigma, non_negative());
+    v("initial_heading_sigma", initial_heading_sigma, non_negative());
+    v("antenna_offset", antenna_offset);
+    v("use_imu_yaw_rate", use_imu_yaw_rate);
+    v("odometry_gap", odometry_gap, positive());
+    v("fix_timeout", fix_timeout, positive());
+    v("bias_timeout", bias_timeout, non_negative());
+    v("time_jump", time_jump, positive());
+    v("reset_on_time_jump", reset_on_time_jump);
+    v("heading_converged_sigma", heading_converged_sigma, positive());
+    datum.visit(v);
+    fix.visit(v);
+    heading.visit(v);
+  }
+  void check(std::vector<std::string>& faults) const;
+};
+
+/// The states of LocalizationStatus.msg.
+enum class LocalizationState : std::uint8_t {
+  kWaitingForOdometry = 0,
+  kWaitingForFix = 1,
+  kWaitingForDatum = 2,
+  kInitializing = 3,
+  kTracking = 4,
+  kDeadReckoning = 5,
+  kLost = 6,
+};
+const char* to_string(LocalizationState state);
+
+/// The estimate at the stamp of an odometry message.
+struct LocalizationOutput {
+  Stamp stamp{0};
+  PoseEstimate estimate;  ///< base in the map frame
+  Pose2 odometry_pose;    ///< base in the odometry frame, as the message said
+  Twist2 twist;
+};
+
+/// The map frame's odometry origin: the transform map -> odom that makes the odometry's pose the estimated one.
+Pose2 map_to_odometry(const LocalizationOutput& output);
+
+/// What LocalizationStatus.msg says.
+struct LocalizationReport {
+  LocalizationState state{LocalizationState::kWaitingForOdometry};
+  bool healthy{false};
+  std::string reason;
+  FixVerdict last_fix;
+  std::uint64_t fixes_used{0};
+  std::uint64_t fixes_rejected{0};
+  double fix_age_s{std::numeric_limits<double>::quiet_NaN()};
+  double odometry_age_s{0.0};
+  double position_sigma_m{std::numeric_limits<double>::quiet_NaN()};
+  bool heading_converged{false};
+  double bias_radius_m{0.0};
+  LocalizerHealth health;
+};
+
+/// A fix that waits for the bias at its stamp.
+struct BiasQuery {
+  LocalFix fix;
+  FixVerdict sanitation;
+  Eigen::Vector2d predicted_antenna_position{Eigen::Vector2d::Zero()};  ///< m, map frame, at the fix's stamp
+};
+
+/// Everything between the messages and the filter, the same for every localizer, live and offline: sanitation, datum,
+/// start, odometry gaps, late fixes, fixes that wait for odometry or for their bias, clocks that are set back.
+///
+/// It acts on stamps, not on times of arrival: what it does depends only on the order in which messages come. A fix
+/// waits for the first odometry message that is not older than it, and is then compared with where the robot was at the
+/// fix's own stamp.
+class LocalizationPipeline {
+ public:
+  /// Requires parameters without faults.
+  LocalizationPipeline(const LocalizationParameters& parameters, std::unique_ptr<Localizer> localizer);
+
+  void add_odometry(const OdometrySample& sample);
+  void add_imu_yaw_rate(Stamp stamp, double yaw_rate_radps);
+  void add_fix(const RawFix& fix);
+  /// The bias at a fix, where the localizer wants one.
+  void add_bias(const BiasEstimate& bias);
+
+  /// Starts the filter at a pose of the map frame (m, rad), now or as soon as it can. Throws std::invalid_argument
+  /// where the pose or the covariance is not finite.
+  void set_pose(const PoseEstimate& pose);
+  /// Sets the map frame's origin; the filter starts anew where it had another. Throws std::invalid_argument where there
+  /// is no such place.
+  void set_datum(const GeodeticPosition& datum);
+
+  /// Forgets everything but parameters and a datum that was set.
+  void reset(const std::string& why);
+
+  /// What came of the messages since the last call.
+  std::vector<LocalizationOutput> take_outputs();
+  std::vector<FixVerdict> take_verdicts();
+  std::vector<PipelineEvent> take_events();
+
+  /// The fix that waits for its bias next, where the one who calls has the bias filter at hand.
+  std::optional<BiasQuery> bias_query() const;
+
+  const std::optional<LocalFrame>& frame() const { return frame_; }
+  bool initialized() const { return initialized_; }
+  const Localizer& localizer() const { return *localizer_; }
+  LocalizationReport report() const;
+  /// One sentence for people; empty where nothing is waited for.
+  std::string waiting_for() const;
+
+ private:
+  struct PendingFix {
+    LocalFix fix;
+    FixVerdict sanitation;
+  };
+
+  void use_datum(const GeodeticPosition& datum, const std::string& source);
+  void sanitize(const RawFix& fix);
+  void process_fixes();
+  bool process_next_fix();
+  void initialize_with(const PendingFix& pending);
+  void start(const PoseEstimate& pose, const std::string& how);
+  void correct_with(const PendingFix& pending, double radius_m);
+  void decide(FixVerdict verdict);
+  void guard_against_non_finite();
+  Twist2 with_imu(const OdometrySample& sample, Stamp since);
+  bool jumped(StampMonitor& monitor, Stamp stamp, const char* stream);
+  Eigen::Vector2d antenna_offset() const;
+  void event(PipelineEvent::Level level, const std::string& text);
+
+  LocalizationParameters parameters_;
+  std::unique_ptr<Localizer> localizer_;
+  DatumInitializer datum_initializer_;
+  HeadingInitializer heading_initializer_;
+  bool datum_was_set_{false};
+  std::optional<LocalFrame> frame_;
+  std::optional<PoseEstimate> start_;  ///< where to start, until it is used
+
+  OdometryHistory history_;
+  StampMonitor odometry_stamps_;
+  StampMonitor fix_stamps_;
+  StampMonitor imu_stamps_;
+  std::optional<OdometrySample> last_odometry_;
+  std::deque<std::pair<Stamp, double>> imu_yaw_rates_;
+
+  std::deque<RawFix> before_datum_;
+  std::deque<PendingFix> pending_;
+  std::optional<Stamp> last_fix_stamp_;
+  std::deque<BiasEstimate> biases_;
+  double last_radius_m_{0.0};
+
+  bool initialized_{false};
+  bool lost_{false};
+  std::optional<Stamp> last_used_;
+  FixVerdict last_verdict_;
+  std::uint64_t fixes_used_{0};
+  std::uint64_t fixes_rejected_{0};
+
+  std::vector<LocalizationOutput> outputs_;
+  std::vector<FixVerdict> verdicts_;
+  std::vector<PipelineEvent> events_;
+};
+
+}  // namespace urban_gnss

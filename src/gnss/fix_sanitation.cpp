@@ -1,0 +1,164 @@
+#include "urban_gnss_localization/gnss/fix_sanitation.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+
+namespace urban_gnss {
+namespace {
+
+std::string number(double value) {
+  std::ostringstream out;
+  out << value;
+  return out.str();
+}
+
+void add_reason(FixVerdict& verdict, const std::string& reason) {
+  verdict.reason += (verdict.reason.empty() ? "" : "; ") + reason;
+}
+
+struct Rejection {
+  FixDecision decision;
+  std::string reason;
+};
+
+std::optional<Rejection> reject_position(const RawFix& raw) {
+  if (!raw.has_fix) return Rejection{FixDecision::kRejectedStatus, "the receiver has no fix"};
+  const auto& [latitude, longitude, altitude] = raw.position;
+  (void)altitude;
+  if (!std::isfinite(latitude) || !std::isfinite(longitude)) {
+    return Rejection{FixDecision::kRejectedNonFinite,
+                     "latitude " + number(latitude) + ", longitude " + number(longitude) + " is not finite"};
+  }
+  if (raw.stamp < Stamp::zero()) {
+    return Rejection{FixDecision::kRejectedOutOfRange, "negative stamp " + number(to_seconds(raw.stamp)) + " s"};
+  }
+  if (!is_latitude(latitude) || !is_longitude(longitude)) {
+    return Rejection{FixDecision::kRejectedOutOfRange,
+                     "latitude " + number(latitude) + ", longitude " + number(longitude) + " is no place"};
+  }
+  if (latitude == 0.0 && longitude == 0.0) {
+    return Rejection{FixDecision::kRejectedOutOfRange, "latitude and longitude are both 0"};
+  }
+  return std::nullopt;
+}
+
+std::optional<Rejection> reject_stamp(Stamp stamp, std::optional<Stamp> last_stamp) {
+  if (!last_stamp || stamp > *last_stamp) return std::nullopt;
+  if (stamp == *last_stamp) return Rejection{FixDecision::kRejectedStale, "duplicate of the last fix's stamp"};
+  return Rejection{FixDecision::kRejectedStale,
+                   number(to_seconds(*last_stamp) - to_seconds(stamp)) + " s older than the last fix"};
+}
+
+std::optional<Rejection> reject_distance(const RawFix& raw, const LocalFrame& frame, double max_distance) {
+  // At the datum's height, so that a height above another reference than the ellipsoid does not count; and through the
+  // Earth, because the horizontal distance shrinks again towards the antipode.
+  const GeodeticPosition place{raw.position.latitude_deg, raw.position.longitude_deg, frame.datum().altitude_m};
+  const double distance = frame.to_local(place).norm();
+  if (distance <= max_distance) return std::nullopt;
+  return Rejection{FixDecision::kRejectedOutOfRange,
+                   number(distance) + " m from the datum, farther than " + number(max_distance) + " m"};
+}
+
+/// The declared horizontal covariance as standard deviations and correlation, which neither overflow nor underflow.
+/// Nothing where it cannot be used.
+struct HorizontalCovariance {
+  Eigen::Array2d sigma;
+  double correlation;
+};
+
+std::optional<HorizontalCovariance> declared_covariance(const RawFix& raw) {
+  const Eigen::Array2d sigma = raw.covariance.diagonal().head<2>().array().sqrt();  // NaN where negative
+  if (!sigma.isFinite().all() || !(sigma > 0.0).all()) return std::nullopt;
+  if (raw.covariance_type == CovarianceType::kDiagonalKnown) return HorizontalCovariance{sigma, 0.0};
+  const double mean_off_diagonal = 0.5 * raw.covariance(0, 1) + 0.5 * raw.covariance(1, 0);
+  const double correlation = mean_off_diagonal / sigma.x() / sigma.y();
+  if (!(std::abs(correlation) < 1.0)) return std::nullopt;
+  return HorizontalCovariance{sigma, correlation};
+}
+
+Eigen::Matrix2d clamp_covariance(HorizontalCovariance declared, const FixSanitationParameters& parameters,
+                                 FixVerdict& verdict) {
+  const double floor = parameters.fix_sigma_floor;
+  const double ceiling = parameters.fix_sigma_ceiling;
+  // The eigenvalues of diag(1e300, 1) have no digits left for the 1. What is far above the ceiling ends at the ceiling.
+  const Eigen::Array2d sigma = (declared.sigma * std::sqrt(parameters.fix_covariance_scale)).min(1e4 * ceiling);
+  Eigen::Matrix2d covariance;
+  covariance(0, 0) = sigma.x() * sigma.x();
+  covariance(1, 1) = sigma.y() * sigma.y();
+  covariance(0, 1) = covariance(1, 0) = declared.correlation * sigma.x() * sigma.y();
+
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> ellipse(covariance);
+  const Eigen::Array2d variances = ellipse.eigenvalues();
+  const bool is_below = variances.minCoeff() < floor * floor;
+  const bool is_above = variances.maxCoeff() > ceiling * ceiling;
+  if (!is_below && !is_above) return covariance;
+
+  verdict.covariance_clamped = true;
+  if (is_below) {
+    verdict.decision = FixDecision::kInflated;
+    const double smallest = std::sqrt(std::max(variances.minCoeff(), 0.0));
+    add_reason(verdict, "declared sigma " + number(smallest) + " m raised to the floor of " + number(floor) + " m");
+  }
+  if (is_above) add_reason(verdict, "declared sigma lowered to the ceiling of " + number(ceiling) + " m");
+  const Eigen::Vector2d clamped = variances.max(floor * floor).min(ceiling * ceiling);
+  const Eigen::Matrix2d& axes = ellipse.eigenvectors();
+  const Eigen::Matrix2d product = axes * clamped.asDiagonal() * axes.transpose();
+  return 0.5 * (product + product.transpose());
+}
+
+Eigen::Matrix2d usable_covariance(const RawFix& raw, const FixSanitationParameters& parameters, FixVerdict& verdict) {
+  const bool is_unknown = raw.covariance_type == CovarianceType::kUnknown;
+  const auto declared = is_unknown ? std::nullopt : declared_covariance(raw);
+  if (declared) return clamp_covariance(*declared, parameters, verdict);
+  const double sigma = parameters.fix_sigma_default;
+  verdict.decision = FixDecision::kInflated;
+  verdict.covariance_clamped = true;
+  add_reason(verdict, std::string(is_unknown ? "no covariance declared" : "declared covariance cannot be used") +
+                          ": default sigma " + number(sigma) + " m");
+  return sigma * sigma * Eigen::Matrix2d::Identity();
+}
+
+}  // namespace
+
+void FixSanitationParameters::check(std::vector<std::string>& faults) const {
+  if (!(fix_sigma_floor <= fix_sigma_ceiling)) {
+    faults.push_back("fix_sigma_floor = " + number(fix_sigma_floor) + ": must be at most fix_sigma_ceiling = " +
+                     number(fix_sigma_ceiling));
+  } else if (!(fix_sigma_floor <= fix_sigma_default && fix_sigma_default <= fix_sigma_ceiling)) {
+    faults.push_back("fix_sigma_default = " + number(fix_sigma_default) + ": must be at least fix_sigma_floor = " +
+                     number(fix_sigma_floor) + " and at most fix_sigma_ceiling = " + number(fix_sigma_ceiling));
+  }
+}
+
+bool is_usable_position(const RawFix& raw) { return !reject_position(raw); }
+
+SanitizedFix sanitize_fix(const RawFix& raw, const LocalFrame& frame, std::optional<Stamp> last_stamp,
+                          const FixSanitationParameters& parameters) {
+  SanitizedFix result;
+  result.fix.stamp = raw.stamp;
+  FixVerdict& verdict = result.verdict;
+  verdict.stamp = raw.stamp;
+
+  std::optional<Rejection> rejection = reject_position(raw);
+  if (!rejection) rejection = reject_stamp(raw.stamp, last_stamp);
+  if (!rejection) rejection = reject_distance(raw, frame, parameters.max_distance_from_datum);
+  if (rejection) {
+    verdict.decision = rejection->decision;
+    verdict.reason = rejection->reason;
+    return result;
+  }
+
+  verdict.decision = FixDecision::kAccepted;
+  GeodeticPosition position = raw.position;
+  if (!is_altitude(position.altitude_m)) {
+    add_reason(verdict, "no usable altitude: the datum's is used");
+    position.altitude_m = frame.datum().altitude_m;
+  }
+  result.fix.position = frame.to_local(position).head<2>();
+  result.fix.covariance = usable_covariance(raw, parameters, verdict);
+  return result;
+}
+
+}  // namespace urban_gnss

@@ -1,0 +1,419 @@
+#include "urban_gnss_localization/pipeline/localization_pipeline.hpp"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+#include <stdexcept>
+#include <utility>
+
+namespace urban_gnss {
+namespace {
+
+constexpr double kHistory_s = 10.0;
+constexpr std::size_t kMaxWaitingFixes = 1000;
+constexpr double kLeastClusterMass = 0.5;
+
+std::string seconds_text(double seconds) {
+  std::ostringstream out;
+  out.precision(3);
+  out << seconds << " s";
+  return out.str();
+}
+
+}  // namespace
+
+void LocalizationParameters::check(std::vector<std::string>& faults) const {
+  if (!initial_pose.empty() && initial_pose.size() != 3) {
+    faults.push_back("initial_pose: has " + std::to_string(initial_pose.size()) +
+                     " numbers; must be x, y (m) and yaw (rad), or empty");
+  }
+  if (antenna_offset.size() != 2) faults.push_back("antenna_offset: must be x and y (m)");
+  datum.check(faults);
+  fix.check(faults);
+  heading.check(faults);
+}
+
+const char* to_string(LocalizationState state) {
+  switch (state) {
+    case LocalizationState::kWaitingForOdometry: return "waiting for odometry";
+    case LocalizationState::kWaitingForFix: return "waiting for a fix";
+    case LocalizationState::kWaitingForDatum: return "waiting for the datum";
+    case LocalizationState::kInitializing: return "initializing";
+    case LocalizationState::kTracking: return "tracking";
+    case LocalizationState::kDeadReckoning: return "dead reckoning";
+    case LocalizationState::kLost: return "lost";
+  }
+  return "?";
+}
+
+Pose2 map_to_odometry(const LocalizationOutput& output) {
+  return compose(output.estimate.pose, inverse(output.odometry_pose));
+}
+
+LocalizationPipeline::LocalizationPipeline(const LocalizationParameters& parameters,
+                                           std::unique_ptr<Localizer> localizer)
+    : parameters_(parameters),
+      localizer_(std::move(localizer)),
+      datum_initializer_(parameters.datum),
+      heading_initializer_(parameters.heading),
+      history_(kHistory_s),
+      odometry_stamps_(parameters.time_jump),
+      fix_stamps_(parameters.time_jump),
+      imu_stamps_(parameters.time_jump) {
+  reset({});
+}
+
+void LocalizationPipeline::reset(const std::string& why) {
+  if (!why.empty()) event(PipelineEvent::Level::kWarn, "reset: " + why);
+  datum_initializer_.reset();
+  heading_initializer_.reset();
+  history_.clear();
+  odometry_stamps_.reset();
+  fix_stamps_.reset();
+  imu_stamps_.reset();
+  last_odometry_.reset();
+  imu_yaw_rates_.clear();
+  before_datum_.clear();
+  pending_.clear();
+  last_fix_stamp_.reset();
+  biases_.clear();
+  last_radius_m_ = 0.0;
+  initialized_ = false;
+  lost_ = false;
+  last_used_.reset();
+  last_verdict_ = {};
+  fixes_used_ = 0;
+  fixes_rejected_ = 0;
+  start_.reset();
+  if (parameters_.initial_pose.size() == 3) {
+    PoseEstimate start;
+    start.pose = {parameters_.initial_pose[0], parameters_.initial_pose[1], wrap_angle(parameters_.initial_pose[2])};
+    const double p2 = parameters_.initial_position_sigma * parameters_.initial_position_sigma;
+    const double h2 = parameters_.initial_heading_sigma * parameters_.initial_heading_sigma;
+    start.covariance = Eigen::Vector3d(p2, p2, h2).asDiagonal();
+    start_ = start;
+  }
+  if (!datum_was_set_) {
+    frame_.reset();
+    if (const auto datum = datum_initializer_.fixed()) use_datum(*datum, "parameter");
+  }
+}
+
+void LocalizationPipeline::use_datum(const GeodeticPosition& datum, const std::string& source) {
+  frame_.emplace(datum);
+  std::ostringstream text;
+  text.precision(10);
+  text << "datum from " << source << ": latitude " << datum.latitude_deg << ", longitude " << datum.longitude_deg
+       << ", altitude " << datum.altitude_m << " m";
+  event(PipelineEvent::Level::kInfo, text.str());
+  const std::deque<RawFix> waiting = std::exchange(before_datum_, {});
+  for (const RawFix& fix : waiting) sanitize(fix);
+  process_fixes();
+}
+
+void LocalizationPipeline::set_datum(const GeodeticPosition& datum) {
+  LocalFrame checked(datum);  // throws before anything changes
+  const bool moves = frame_ && (initialized_ || heading_initializer_.timed_out());
+  datum_was_set_ = true;
+  if (moves) {
+    frame_ = std::move(checked);
+    reset("the datum was set to another place");
+    return;
+  }
+  use_datum(datum, "request");
+}
+
+void LocalizationPipeline::set_pose(const PoseEstimate& pose) {
+  if (!is_finite(pose.pose) || !pose.covariance.allFinite()) {
+    throw std::invalid_argument("pose or covariance is not finite");
+  }
+  start_ = pose;
+  if (frame_ && last_odometry_) start(pose, "a pose that was set");
+}
+
+bool LocalizationPipeline::jumped(StampMonitor& monitor, Stamp stamp, const char* stream) {
+  const auto last = monitor.last();
+  if (monitor.observe(stamp) != StampMonitor::Order::kJumpedBack) return false;
+  if (!parameters_.reset_on_time_jump) return false;
+  reset(std::string("the clock of the ") + stream + " jumped back by " + seconds_text(to_seconds(*last - stamp)));
+  monitor.observe(stamp);
+  return true;
+}
+
+void LocalizationPipeline::add_imu_yaw_rate(Stamp stamp, double yaw_rate_radps) {
+  OdometrySample as_odometry;
+  as_odometry.twist.yaw_rate_radps = yaw_rate_radps;
+  if (!odometry_fault(as_odometry).empty()) return;
+  jumped(imu_stamps_, stamp, "IMU");
+  if (imu_stamps_.last() != stamp) return;
+  imu_yaw_rates_.emplace_back(stamp, yaw_rate_radps);
+  while (imu_yaw_rates_.size() > 1 && to_seconds(stamp - imu_yaw_rates_.front().first) > kHistory_s) {
+    imu_yaw_rates_.pop_front();
+  }
+}
+
+Twist2 LocalizationPipeline::with_imu(const OdometrySample& sample, Stamp since) {
+  Twist2 twist = sample.twist;
+  if (!parameters_.use_imu_yaw_rate) return twist;
+  double sum = 0.0;
+  int count = 0;
+  for (const auto& [stamp, rate] : imu_yaw_rates_) {
+    if (stamp <= since || stamp > sample.stamp) continue;
+    sum += rate;
+    ++count;
+  }
+  if (count > 0) twist.yaw_rate_radps = sum / count;
+  return twist;
+}
+
+void LocalizationPipeline::add_odometry(const OdometrySample& sample) {
+  const std::string fault = odometry_fault(sample);
+  if (!fault.empty()) {
+    event(PipelineEvent::Level::kWarn, "odometry left out: " + fault);
+    return;
+  }
+  jumped(odometry_stamps_, sample.stamp, "odometry");
+  if (odometry_stamps_.last() != sample.stamp || (last_odometry_ && sample.stamp <= last_odometry_->stamp)) return;
+
+  const double elapsed_s = last_odometry_ ? to_seconds(sample.stamp - last_odometry_->stamp) : 0.0;
+  const Twist2 twist = with_imu(sample, last_odometry_ ? last_odometry_->stamp : sample.stamp);
+  if (elapsed_s > parameters_.odometry_gap) {
+    event(PipelineEvent::Level::kWarn, "no odometry for " + seconds_text(elapsed_s) + (initialized_ ? ": place unknown, starting anew from the fixes" : ""));
+    history_.clear();
+    heading_initializer_.reset();
+    lost_ = lost_ || initialized_;
+    initialized_ = false;
+  }
+  history_.add(sample.stamp, twist);
+  last_odometry_ = sample;
+  last_odometry_->twist = twist;
+  if (initialized_ && elapsed_s > 0.0) {
+    localizer_->move(twist, elapsed_s);
+    guard_against_non_finite();
+  }
+  if (!initialized_ && start_ && frame_) start(*start_, "the given pose");
+  process_fixes();
+  if (initialized_) outputs_.push_back({sample.stamp, localizer_->estimate(), sample.pose, twist});
+}
+
+void LocalizationPipeline::add_fix(const RawFix& fix) {
+  jumped(fix_stamps_, fix.stamp, "fixes");
+  if (!frame_) {
+    before_datum_.push_back(fix);
+    if (before_datum_.size() > kMaxWaitingFixes) before_datum_.pop_front();
+    if (const auto datum = datum_initializer_.add(fix)) {
+      use_datum(*datum, std::to_string(parameters_.datum.datum_fix_count) + " agreeing fixes");
+    }
+    return;
+  }
+  sanitize(fix);
+  process_fixes();
+}
+
+void LocalizationPipeline::sanitize(const RawFix& fix) {
+  SanitizedFix sane = sanitize_fix(fix, *frame_, last_fix_stamp_, parameters_.fix);
+  if (is_rejected(sane.verdict.decision)) {
+    decide(std::move(sane.verdict));
+    return;
+  }
+  last_fix_stamp_ = fix.stamp;
+  if (pending_.size() >= kMaxWaitingFixes) pending_.pop_front();
+  pending_.push_back({sane.fix, std::move(sane.verdict)});
+}
+
+void LocalizationPipeline::add_bias(const BiasEstimate& bias) {
+  biases_.push_back(bias);
+  if (biases_.size() > kMaxWaitingFixes) biases_.pop_front();
+  process_fixes();
+}
+
+std::optional<BiasQuery> LocalizationPipeline::bias_query() const {
+  if (!initialized_ || !localizer_->wants_bias() || pending_.empty() || history_.empty()) return std::nullopt;
+  const PendingFix& next = pending_.front();
+  const auto motion = history_.motion_between(history_.latest(), next.fix.stamp);
+  if (!motion) return std::nullopt;
+  return BiasQuery{next.fix, next.sanitation,
+                   transform_point(compose(localizer_->pose(), *motion), antenna_offset())};
+}
+
+Eigen::Vector2d LocalizationPipeline::antenna_offset() const {
+  return {parameters_.antenna_offset[0], parameters_.antenna_offset[1]};
+}
+
+void LocalizationPipeline::process_fixes() {
+  while (process_next_fix()) {
+  }
+}
+
+bool LocalizationPipeline::process_next_fix() {
+  if (pending_.empty() || history_.empty()) return false;
+  const PendingFix next = pending_.front();
+  if (next.fix.stamp > history_.latest()) return false;
+  if (next.fix.stamp < history_.oldest()) {
+    pending_.pop_front();
+    FixVerdict verdict = next.sanitation;
+    verdict.decision = FixDecision::kRejectedStale;
+    verdict.reason = "older than the odometry that is remembered";
+    decide(std::move(verdict));
+    return true;
+  }
+  if (!initialized_) {
+    pending_.pop_front();
+    initialize_with(next);
+    return true;
+  }
+  if (localizer_->wants_bias()) {
+    while (!biases_.empty() && biases_.front().stamp < next.fix.stamp) biases_.pop_front();
+    if (!biases_.empty() && biases_.front().stamp == next.fix.stamp) {
+      const BiasEstimate bias = biases_.front();
+      last_radius_m_ = bias.radius_m;
+      pending_.pop_front();
+      if (is_rejected(bias.verdict.decision)) {
+        decide(bias.verdict);
+      } else {
+        correct_with(next, bias.radius_m);
+      }
+      return true;
+    }
+    if (to_seconds(history_.latest() - next.fix.stamp) < parameters_.bias_timeout) return false;
+    event(PipelineEvent::Level::kWarn, "no gps/bias for a fix within " + seconds_text(parameters_.bias_timeout) +
+                                           ": the last radius is used");
+  }
+  pending_.pop_front();
+  correct_with(next, last_radius_m_);
+  return true;
+}
+
+void LocalizationPipeline::correct_with(const PendingFix& pending, double radius_m) {
+  const auto motion = history_.motion_between(history_.latest(), pending.fix.stamp);
+  FixMeasurement measurement;
+  measurement.position = pending.fix.position;
+  measurement.covariance = pending.fix.covariance;
+  measurement.antenna_in_body = transform_point(*motion, antenna_offset());
+  measurement.bias_radius_m = radius_m;
+  measurement.time_s = to_seconds(pending.fix.stamp);
+  FixVerdict verdict = localizer_->correct(measurement);
+  verdict.stamp = pending.fix.stamp;
+  verdict.covariance_clamped = pending.sanitation.covariance_clamped;
+  if (verdict.decision == FixDecision::kAccepted) verdict.decision = pending.sanitation.decision;
+  if (verdict.reason.empty()) verdict.reason = pending.sanitation.reason;
+  decide(std::move(verdict));
+  guard_against_non_finite();
+}
+
+void LocalizationPipeline::initialize_with(const PendingFix& pending) {
+  const auto at_fix = history_.pose_at(pending.fix.stamp);
+  const Eigen::Vector2d offset = antenna_offset();
+  const Pose2 antenna{offset.x(), offset.y(), 0.0};
+  heading_initializer_.add(compose(*at_fix, antenna), pending.fix);
+  FixVerdict verdict = pending.sanitation;
+  verdict.decision = FixDecision::kNotExamined;
+  verdict.reason = "used for the start";
+  last_verdict_ = verdict;
+  verdicts_.push_back(verdict);
+
+  std::optional<PoseEstimate> found = heading_initializer_.estimate();
+  std::string how = "fixes and motion";
+  if (!found && heading_initializer_.timed_out()) {
+    found = heading_initializer_.without_heading();
+    how = "fixes, heading unknown";
+  }
+  if (!found) return;
+  const Pose2 since = *history_.motion_between(pending.fix.stamp, history_.latest());
+  found->pose = compose(compose(found->pose, inverse(antenna)), since);
+  last_used_ = pending.fix.stamp;
+  start(*found, how);
+}
+
+void LocalizationPipeline::start(const PoseEstimate& pose, const std::string& how) {
+  localizer_->initialize(pose);
+  initialized_ = true;
+  lost_ = false;
+  start_.reset();
+  heading_initializer_.reset();
+  last_radius_m_ = 0.0;
+  std::ostringstream text;
+  text.precision(4);
+  text << "started from " << how << ": x " << pose.pose.x << " m, y " << pose.pose.y << " m, yaw " << pose.pose.yaw
+       << " rad";
+  event(PipelineEvent::Level::kInfo, text.str());
+}
+
+void LocalizationPipeline::decide(FixVerdict verdict) {
+  if (is_rejected(verdict.decision)) {
+    ++fixes_rejected_;
+  } else {
+    ++fixes_used_;
+    last_used_ = verdict.stamp;
+  }
+  last_verdict_ = verdict;
+  verdicts_.push_back(std::move(verdict));
+}
+
+void LocalizationPipeline::guard_against_non_finite() {
+  if (is_finite(localizer_->pose())) return;
+  event(PipelineEvent::Level::kError, "the estimate is not finite: starting anew from the fixes");
+  initialized_ = false;
+  lost_ = true;
+  heading_initializer_.reset();
+}
+
+void LocalizationPipeline::event(PipelineEvent::Level level, const std::string& text) {
+  events_.push_back({level, text});
+}
+
+std::vector<LocalizationOutput> LocalizationPipeline::take_outputs() { return std::exchange(outputs_, {}); }
+std::vector<FixVerdict> LocalizationPipeline::take_verdicts() { return std::exchange(verdicts_, {}); }
+std::vector<PipelineEvent> LocalizationPipeline::take_events() { return std::exchange(events_, {}); }
+
+std::string LocalizationPipeline::waiting_for() const {
+  if (initialized_) return {};
+  if (!last_odometry_) return "odometry";
+  if (!frame_) return "the datum: " + datum_initializer_.waiting_for();
+  if (!last_fix_stamp_) return "a usable fix";
+  return "the start: " + heading_initializer_.waiting_for();
+}
+
+LocalizationReport LocalizationPipeline::report() const {
+  LocalizationReport report;
+  report.last_fix = last_verdict_;
+  report.fixes_used = fixes_used_;
+  report.fixes_rejected = fixes_rejected_;
+  report.bias_radius_m = last_radius_m_;
+  if (last_odometry_ && last_used_) report.fix_age_s = to_seconds(last_odometry_->stamp - *last_used_);
+  if (last_odometry_ && last_fix_stamp_) {
+    report.odometry_age_s = std::max(0.0, to_seconds(*last_fix_stamp_ - last_odometry_->stamp));
+  }
+  if (!initialized_) {
+    report.state = lost_              ? LocalizationState::kLost
+                   : !last_odometry_  ? LocalizationState::kWaitingForOdometry
+                   : !last_fix_stamp_ && frame_ ? LocalizationState::kWaitingForFix
+                   : !frame_          ? LocalizationState::kWaitingForDatum
+                                      : LocalizationState::kInitializing;
+    report.reason = "waiting for " + waiting_for();
+    return report;
+  }
+  const PoseEstimate estimate = localizer_->estimate();
+  report.health = localizer_->health();
+  const Eigen::Matrix2d position = estimate.covariance.topLeftCorner<2, 2>();
+  report.position_sigma_m =
+      std::sqrt(std::max(0.0, Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(position).eigenvalues()(1)));
+  report.heading_converged = report.health.heading_sigma_rad < parameters_.heading_converged_sigma;
+  const bool is_starved = !(report.fix_age_s <= parameters_.fix_timeout);
+  report.state = is_starved ? LocalizationState::kDeadReckoning : LocalizationState::kTracking;
+  if (is_starved) {
+    report.reason = "no fix was used for " + seconds_text(report.fix_age_s);
+  } else if (report.odometry_age_s > parameters_.odometry_gap) {
+    report.reason = "no odometry for " + seconds_text(report.odometry_age_s);
+  } else if (!report.heading_converged) {
+    report.reason = "heading not known yet";
+  } else if (report.health.cluster_mass < kLeastClusterMass) {
+    report.reason = "particles disagree: no cluster holds half of the weight";
+  } else {
+    report.healthy = true;
+  }
+  return report;
+}
+
+}  // namespace urban_gnss

@@ -1,0 +1,407 @@
+// Monte Carlo of the simulation of Nishida et al., section 4: seeds x laps x methods, all on the same noise.
+
+#include <ros/package.h>
+#include <sys/utsname.h>
+
+#include <CLI/CLI.hpp>
+#include <array>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <iomanip>
+#include <iostream>
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <thread>
+
+#include "urban_gnss_localization/common/progress.hpp"
+#include "urban_gnss_localization/evaluation/statistics.hpp"
+#include "urban_gnss_localization/experiments/paper_experiment.hpp"
+#include "urban_gnss_localization/ros/plotting.hpp"
+
+namespace fs = std::filesystem;
+using namespace urban_gnss;
+
+namespace {
+
+constexpr double kDiverged_m = 5.0;
+constexpr int kCurveStride = 10;  ///< steps between points of the curves over all seeds
+
+struct Options {
+  int seeds = 30;
+  int first_seed = 1;
+  int laps = 3;
+  double noise_scale = -1.0;  ///< as configured
+  std::string bias_direction;
+  std::vector<std::string> methods;
+  std::vector<std::string> overrides;
+  std::string config;
+  std::string json_file;
+  std::string plots;
+  bool open_loop = false;
+  int jobs = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+};
+
+/// Errors of one run, and the positions of its curve.
+struct RunErrors {
+  std::vector<double> position_m[2];   ///< sun, shadow
+  std::vector<double> heading_rad[2];
+  std::vector<double> cross_track_m;
+  std::vector<double> curve_position_m;
+  std::vector<double> curve_heading_rad;
+  double worst_m = 0.0;
+  double runtime_s = 0.0;
+};
+
+YAML::Node load_yaml(const fs::path& file) {
+  try {
+    return YAML::LoadFile(file.string());
+  } catch (const YAML::Exception& error) {
+    throw std::runtime_error(file.string() + ": " + error.what());
+  }
+}
+
+PaperExperimentConditions load_conditions(const Options& options) {
+  const fs::path directory =
+      options.config.empty() ? fs::path(ros::package::getPath("urban_gnss_localization")) / "config" / "paper_field"
+                             : fs::path(options.config);
+  YAML::Node simulator = load_yaml(directory / "simulator.yaml");
+  YAML::Node filter = load_yaml(directory / "particle_filter.yaml");
+  YAML::Node bias = load_yaml(directory / "gps_bias.yaml");
+  YAML::Node controller = load_yaml(directory / "waypoint_controller.yaml");
+  for (const std::string& text : options.overrides) {
+    const auto dot = text.find('.');
+    const auto equal = text.find('=');
+    if (dot == std::string::npos || equal == std::string::npos || dot > equal) {
+      throw std::runtime_error("--set " + text + ": must be FILE.NAME=VALUE, e.g. particle_filter.ring_share=0.01");
+    }
+    const std::string file = text.substr(0, dot);
+    YAML::Node* target = file == "simulator"             ? &simulator
+                         : file == "particle_filter"     ? &filter
+                         : file == "gps_bias"            ? &bias
+                         : file == "waypoint_controller" ? &controller
+                                                         : nullptr;
+    if (target == nullptr) throw std::runtime_error("--set " + text + ": no such file as " + file);
+    (*target)[text.substr(dot + 1, equal - dot - 1)] = YAML::Load(text.substr(equal + 1));
+  }
+  if (!options.bias_direction.empty()) simulator["bias_direction"] = options.bias_direction;
+  if (options.noise_scale >= 0.0) {
+    simulator["odom_noise_scale"] = options.noise_scale;
+    filter["odom_noise_scale"] = options.noise_scale;
+  }
+
+  PaperExperimentConditions conditions;
+  std::vector<std::string> faults;
+  const auto finish = [&](const ParameterReader& reader, const char* name) {
+    for (const std::string& fault : reader.finish()) faults.push_back(std::string(name) + "." + fault);
+  };
+  ParameterReader simulator_reader(simulator);
+  simulator_reader.ignore("field");
+  finish(simulator_reader.read(conditions.field).read(conditions.field_motion), "simulator");
+  ParameterReader filter_reader(filter);
+  finish(filter_reader.read(conditions.filter).read(conditions.filter_motion), "particle_filter");
+  ParameterReader bias_reader(bias);
+  finish(bias_reader.read(conditions.bias), "gps_bias");
+  ParameterReader controller_reader(controller);
+  finish(controller_reader.read(conditions.controller), "waypoint_controller");
+  if (!faults.empty()) throw ParameterError(directory.string(), faults);
+  conditions.controller.targets = conditions.field.targets();
+  conditions.laps = options.laps;
+  conditions.closed_loop = !options.open_loop;
+  return conditions;
+}
+
+std::vector<PaperMethod> select_methods(const std::vector<std::string>& names) {
+  std::vector<PaperMethod> selected;
+  for (const std::string& name : names) {
+    const auto& all = paper_methods();
+    const auto found = std::find_if(all.begin(), all.end(), [&](const auto& m) { return m.name == name; });
+    if (found == all.end()) {
+      std::string known;
+      for (const auto& method : all) known += " " + method.name;
+      throw std::runtime_error("--methods " + name + ": no such method; there are" + known);
+    }
+    selected.push_back(*found);
+  }
+  return selected;
+}
+
+/// Writes what the figures of one run need: the whole trajectory, and the particles at four places of the last lap.
+class TraceWriter {
+ public:
+  TraceWriter(const fs::path& directory, const std::string& method, int last_lap)
+      : last_lap_(last_lap),
+        trajectory_(directory / ("trajectory_" + method + ".csv")),
+        snapshots_(directory / ("snapshots_" + method + ".csv")),
+        particles_(directory / ("particles_" + method + ".csv")) {
+    trajectory_ << "t,lap,true_x,true_y,true_yaw,est_x,est_y,est_yaw,fix_x,fix_y,in_shadow,bias_x,bias_y,radius,ess\n";
+    snapshots_ << "snapshot,t,true_x,true_y,true_yaw,est_x,est_y,est_yaw,fix_x,fix_y,radius\n";
+    particles_ << "snapshot,x,y,yaw,weight\n";
+    for (std::ofstream* out : {&trajectory_, &snapshots_, &particles_}) *out << std::setprecision(9);
+  }
+
+  void write(const PaperStep& s, const ParticleSet* particles) {
+    const auto poses = [&](std::ofstream& out) -> std::ofstream& {
+      out << s.truth.x << ',' << s.truth.y << ',' << s.truth.yaw << ',' << s.estimate.x << ',' << s.estimate.y << ','
+          << s.estimate.yaw << ',' << s.fix.position.x() << ',' << s.fix.position.y() << ',';
+      return out;
+    };
+    trajectory_ << s.time_s << ',' << s.lap << ',';
+    poses(trajectory_) << s.fix.in_shadow << ',' << s.fix.bias.x() << ',' << s.fix.bias.y() << ',' << s.radius_m << ','
+                       << s.effective_sample_size << '\n';
+    const double bearing = std::atan2(s.truth.y, s.truth.x);
+    if (particles != nullptr && s.lap == last_lap_ && next_ < kPlaces.size() &&
+        std::abs(angle_difference(bearing, degrees_to_radians(kPlaces[next_]))) < degrees_to_radians(5.0)) {
+      snapshots_ << next_ << ',' << s.time_s << ',';
+      poses(snapshots_) << s.radius_m << '\n';
+      for (std::size_t i = 0; i < particles->size(); ++i) {
+        particles_ << next_ << ',' << particles->x[i] << ',' << particles->y[i] << ',' << particles->yaw[i] << ','
+                   << particles->weight[i] << '\n';
+      }
+      ++next_;
+    }
+  }
+
+ private:
+  static constexpr std::array<double, 4> kPlaces{60.0, 110.0, 180.0, 250.0};  ///< deg, bearing from the origin
+  int last_lap_;
+  std::size_t next_ = 0;
+  std::ofstream trajectory_;
+  std::ofstream snapshots_;
+  std::ofstream particles_;
+};
+
+RunErrors run(const PaperMethod& method, PaperExperimentConditions conditions, int seed, TraceWriter* trace) {
+  conditions.field.seed = seed;
+  conditions.filter.seed = seed;
+  RunErrors errors;
+  const auto start = std::chrono::steady_clock::now();
+  int k = 0;
+  run_paper_experiment(method, conditions, [&](const PaperStep& step, const ParticleSet* particles) {
+    const double position = (step.estimate.position() - step.truth.position()).norm();
+    const double heading = std::abs(angle_difference(step.estimate.yaw, step.truth.yaw));
+    const int zone = step.fix.in_shadow ? 1 : 0;
+    errors.position_m[zone].push_back(position);
+    errors.heading_rad[zone].push_back(heading);
+    errors.cross_track_m.push_back(step.cross_track_m);
+    errors.worst_m = std::max(errors.worst_m, position);
+    if (++k % kCurveStride == 0) {
+      errors.curve_position_m.push_back(position);
+      errors.curve_heading_rad.push_back(heading);
+    }
+    if (trace != nullptr) trace->write(step, particles);
+  });
+  errors.runtime_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return errors;
+}
+
+void append(std::vector<double>& all, const std::vector<double>& part) { all.insert(all.end(), part.begin(), part.end()); }
+
+nlohmann::json number(double value) { return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr); }
+
+nlohmann::json zone_json(const std::vector<RunErrors>& runs, int zone) {
+  std::vector<double> position;
+  std::vector<double> heading;
+  for (const RunErrors& run : runs) {
+    append(position, run.position_m[zone]);
+    append(heading, run.heading_rad[zone]);
+  }
+  const Summary p = summarize(std::move(position));
+  const Summary h = summarize(std::move(heading));
+  return {{"position_rmse_m", number(p.rmse)}, {"position_p95_m", number(p.p95)}, {"position_max_m", number(p.max)},
+          {"position_median_m", number(p.median)}, {"heading_rmse_rad", number(h.rmse)}, {"steps", p.count}};
+}
+
+nlohmann::json method_json(const PaperMethod& method, const std::vector<RunErrors>& runs) {
+  std::vector<double> cross_track;
+  double runtime = 0.0;
+  int diverged = 0;
+  for (const RunErrors& run : runs) {
+    append(cross_track, run.cross_track_m);
+    runtime += run.runtime_s;
+    diverged += run.worst_m > kDiverged_m ? 1 : 0;
+  }
+  return {{"description", method.description}, {"sun", zone_json(runs, 0)},
+          {"shadow", zone_json(runs, 1)},      {"diverged", diverged},
+          {"cross_track_rmse_m", number(summarize(std::move(cross_track)).rmse)},
+          {"seeds", runs.size()},              {"cpu_s", runtime}};
+}
+
+void write_curves(const fs::path& file, const std::vector<RunErrors>& runs, double interval_s) {
+  std::ofstream out(file);
+  out << "t,position_rmse_m,position_p95_m,heading_rmse_rad\n" << std::setprecision(9);
+  for (std::size_t i = 0;; ++i) {
+    std::vector<double> position;
+    std::vector<double> heading;
+    for (const RunErrors& run : runs) {
+      if (i >= run.curve_position_m.size()) continue;
+      position.push_back(run.curve_position_m[i]);
+      heading.push_back(run.curve_heading_rad[i]);
+    }
+    if (position.empty()) break;
+    const Summary p = summarize(position);
+    out << static_cast<double>((i + 1) * kCurveStride) * interval_s << ',' << p.rmse << ',' << p.p95 << ','
+        << summarize(heading).rmse << '\n';
+  }
+}
+
+void print_table(const nlohmann::json& metrics) {
+  std::cout << std::left << std::setw(22) << "method" << std::right << std::setw(10) << "diverged" << std::setw(10)
+            << "sun" << std::setw(10) << "shadow" << std::setw(12) << "shadow 95%" << std::setw(12) << "shadow max"
+            << std::setw(12) << "heading" << std::setw(13) << "cross-track\n"
+            << std::left << std::setw(22) << "" << std::right << std::setw(10) << "seeds" << std::setw(10) << "RMSE m"
+            << std::setw(10) << "RMSE m" << std::setw(12) << "m" << std::setw(12) << "m" << std::setw(12) << "RMSE deg"
+            << std::setw(13) << "RMSE m\n";
+  const auto value = [](const nlohmann::json& v) {
+    std::ostringstream text;
+    if (v.is_null()) return std::string("-");
+    text << std::fixed << std::setprecision(v.get<double>() < 100.0 ? 3 : 1) << v.get<double>();
+    return text.str();
+  };
+  for (const auto& name : metrics["method_order"]) {
+    const auto& m = metrics["methods"][name.get<std::string>()];
+    const auto& heading = m["shadow"]["heading_rmse_rad"];
+    std::cout << std::left << std::setw(22) << name.get<std::string>() << std::right << std::setw(10)
+              << std::to_string(m["diverged"].get<int>()) + "/" + std::to_string(m["seeds"].get<int>()) << std::setw(10)
+              << value(m["sun"]["position_rmse_m"]) << std::setw(10) << value(m["shadow"]["position_rmse_m"])
+              << std::setw(12) << value(m["shadow"]["position_p95_m"]) << std::setw(12)
+              << value(m["shadow"]["position_max_m"]) << std::setw(12)
+              << (heading.is_null() ? "-" : value(radians_to_degrees(heading.get<double>()))) << std::setw(12)
+              << value(m["cross_track_rmse_m"]) << '\n';
+  }
+}
+
+std::string machine() {
+  utsname name{};
+  uname(&name);
+  std::ifstream cpus("/proc/cpuinfo");
+  std::string model;
+  for (std::string line; model.empty() && std::getline(cpus, line);) {
+    if (line.rfind("model name", 0) == 0) model = line.substr(line.find(':') + 2);
+  }
+  return std::string(name.sysname) + " " + name.machine + ", " + (model.empty() ? "unknown processor" : model) + ", " +
+         std::to_string(std::thread::hardware_concurrency()) + " threads";
+}
+
+void run_all(const Options& options, const std::string& command) {
+  const PaperExperimentConditions conditions = load_conditions(options);
+  const std::vector<PaperMethod> methods = select_methods(options.methods);
+  const fs::path data = fs::path(options.plots) / "data";
+  if (!options.plots.empty()) fs::create_directories(data);
+
+  const std::size_t seeds = static_cast<std::size_t>(options.seeds);
+  const std::size_t total = methods.size() * seeds;
+  std::vector<std::vector<RunErrors>> results(methods.size(), std::vector<RunErrors>(seeds));
+  std::atomic<std::size_t> next{0};
+  std::size_t done = 0;
+  Progress progress(total, "runs");
+  std::mutex terminal;
+  std::exception_ptr failure;
+  const auto work = [&] {
+    for (std::size_t job = next++; job < total; job = next++) {
+      const std::size_t m = job / seeds;
+      const std::size_t s = job % seeds;
+      try {
+        std::unique_ptr<TraceWriter> trace;
+        if (s == 0 && !options.plots.empty()) {
+          trace = std::make_unique<TraceWriter>(data, methods[m].name, options.laps - 1);
+        }
+        results[m][s] = run(methods[m], conditions, options.first_seed + static_cast<int>(s), trace.get());
+      } catch (...) {
+        const std::lock_guard<std::mutex> lock(terminal);
+        failure = std::current_exception();
+      }
+      const std::lock_guard<std::mutex> lock(terminal);
+      progress.report(++done, methods[m].name);
+    }
+  };
+  const auto start = std::chrono::steady_clock::now();
+  std::vector<std::thread> threads;
+  for (int i = 0; i < options.jobs; ++i) threads.emplace_back(work);
+  for (std::thread& thread : threads) thread.join();
+  progress.finish();
+  if (failure) std::rethrow_exception(failure);
+
+  nlohmann::json metrics;
+  metrics["command"] = command;
+  metrics["machine"] = machine();
+  metrics["wall_s"] = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  metrics["closed_loop"] = conditions.closed_loop;
+  metrics["laps"] = options.laps;
+  for (std::size_t s = 0; s < seeds; ++s) metrics["seeds"].push_back(options.first_seed + static_cast<int>(s));
+  const auto texts = [](const YAML::Node& map) {
+    nlohmann::json json;
+    for (const auto& entry : map) {
+      if (entry.second.IsScalar()) json[entry.first.as<std::string>()] = entry.second.as<std::string>();
+    }
+    return json;
+  };
+  metrics["conditions"] = {
+      {"simulator", texts(ParameterWriter().write(conditions.field).write(conditions.field_motion).map())},
+      {"particle_filter", texts(ParameterWriter().write(conditions.filter).write(conditions.filter_motion).map())},
+      {"gps_bias", texts(ParameterWriter().write(conditions.bias).map())},
+      {"waypoint_controller", texts(ParameterWriter().write(conditions.controller).map())}};
+  for (std::size_t m = 0; m < methods.size(); ++m) {
+    metrics["method_order"].push_back(methods[m].name);
+    metrics["methods"][methods[m].name] = method_json(methods[m], results[m]);
+  }
+  print_table(metrics);
+
+  const auto write_json = [&](const fs::path& file) {
+    if (file.has_parent_path()) fs::create_directories(file.parent_path());
+    std::ofstream out(file);
+    out << metrics.dump(2) << '\n';
+    if (!out) throw std::runtime_error(file.string() + ": cannot be written");
+  };
+  if (!options.json_file.empty()) write_json(options.json_file);
+  if (options.plots.empty()) return;
+  write_json(fs::path(options.plots) / "metrics.json");
+  std::ofstream targets(data / "targets.csv");
+  targets << "x,y\n";
+  for (const auto& target : conditions.controller.target_points()) targets << target.x() << ',' << target.y() << '\n';
+  targets.close();
+  for (std::size_t m = 0; m < methods.size(); ++m) {
+    write_curves(data / ("errors_over_seeds_" + methods[m].name + ".csv"), results[m], conditions.field.interval);
+  }
+  run_plotter("plot_paper_experiment.py", options.plots);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Options options;
+  options.methods = {"paper", "conventional", "literal", "dead_reckoning", "oracle"};
+  CLI::App app("Monte Carlo of the simulation of Nishida et al. (2013), section 4: every method on the same noise.");
+  app.option_defaults()->always_capture_default();
+  app.add_option("--seeds", options.seeds, "how many seeds")->check(CLI::PositiveNumber);
+  app.add_option("--first-seed", options.first_seed, "the first of them")->check(CLI::NonNegativeNumber);
+  app.add_option("--laps", options.laps, "rounds over the eight targets")->check(CLI::PositiveNumber);
+  app.add_option("--noise-scale", options.noise_scale, "factor on the variances of eq. (5)-(7), robot and filters")
+      ->check(CLI::NonNegativeNumber);
+  app.add_option("--bias-direction", options.bias_direction, "where the bias points in the shadow")
+      ->check(CLI::IsMember({"random", "negative_x"}));
+  app.add_option("--methods", options.methods, "comma-separated, or 'all'")->delimiter(',');
+  app.add_option("--set", options.overrides, "another value of a configuration file, FILE.NAME=VALUE; repeatable");
+  app.add_option("--config", options.config, "folder of the four YAML files; default: config/paper_field");
+  app.add_option("--json", options.json_file, "write the metrics here");
+  app.add_option("--plots", options.plots, "write report, figures and their data into this folder");
+  app.add_flag("--open-loop", options.open_loop, "steer on the truth instead of the estimate");
+  app.add_option("--jobs", options.jobs, "threads")->check(CLI::PositiveNumber);
+  CLI11_PARSE(app, argc, argv);
+  if (options.methods == std::vector<std::string>{"all"}) {
+    options.methods.clear();
+    for (const auto& method : paper_methods()) options.methods.push_back(method.name);
+  }
+  std::string command = "rosrun urban_gnss_localization paper_experiment";
+  for (int i = 1; i < argc; ++i) command += std::string(" ") + argv[i];
+  try {
+    run_all(options, command);
+  } catch (const std::exception& error) {
+    std::cerr << "paper_experiment: " << error.what() << '\n';
+    return 1;
+  }
+  return 0;
+}
