@@ -98,6 +98,8 @@ const BiasEstimate& BiasTracker::process(const LocalFix& fix, const Eigen::Vecto
     filter_.predict(to_seconds(fix.stamp - last_predicted_), parameters_.bias_acceleration_density);
   }
   last_predicted_ = fix.stamp;
+  estimate_.stamp = fix.stamp;
+  estimate_.predicted_antenna_position = predicted_antenna_position;
 
   FixVerdict verdict = sanitation;
   verdict.stamp = fix.stamp;
@@ -109,7 +111,6 @@ const BiasEstimate& BiasTracker::process(const LocalFix& fix, const Eigen::Vecto
     if (to_seconds(fix.stamp - last_accepted_) < parameters_.gate_timeout) {
       verdict.decision = FixDecision::kRejectedGate;
       verdict.reason = "bias innovation above its gate";
-      estimate_.stamp = fix.stamp;
       estimate_.verdict = verdict;
       return estimate_;
     }
@@ -123,7 +124,6 @@ const BiasEstimate& BiasTracker::process(const LocalFix& fix, const Eigen::Vecto
   filter_.correct(innovation, noise);
   last_accepted_ = fix.stamp;
 
-  estimate_.stamp = fix.stamp;
   estimate_.bias = filter_.position();
   estimate_.rate = filter_.velocity();
   estimate_.covariance = filter_.position_covariance();

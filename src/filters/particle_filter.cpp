@@ -25,7 +25,9 @@ EnumNames<LikelihoodChoice> enum_names(LikelihoodChoice) {
           {"product", LikelihoodChoice::kProduct}};
 }
 
-EnumNames<Switch> enum_names(Switch) { return {{"auto", Switch::kAuto}, {"on", Switch::kOn}, {"off", Switch::kOff}}; }
+EnumNames<Switch> enum_names(Switch) { 
+  return {{"auto", Switch::kAuto}, {"always", Switch::kAlways}, {"never", Switch::kNever}};
+}
 
 EnumNames<EstimateMethod> enum_names(EstimateMethod) {
   return {{"mean", EstimateMethod::kMean}, {"heaviest_cluster", EstimateMethod::kHeaviestCluster}};
@@ -49,7 +51,7 @@ LikelihoodForm ParticleFilterParameters::likelihood_form() const {
 }
 
 bool ParticleFilterParameters::uses_gps_heading() const {
-  if (use_gps_heading != Switch::kAuto) return use_gps_heading == Switch::kOn;
+  if (use_gps_heading != Switch::kAuto) return use_gps_heading == Switch::kAlways;
   return likelihood_form() != LikelihoodForm::kProduct;
 }
 

@@ -10,7 +10,7 @@ namespace urban_gnss {
 namespace {
 
 constexpr std::size_t kMinFixes = 4;
-constexpr int kIterations = 20;             // a spike of 1.6 km among fixes of 1 m has no say left after five
+constexpr int kIterations = 20;             // the weights settle within a few
 constexpr double kCauchyTuning = 2.3849;    // 95 % efficiency where the noise is Gaussian after all
 constexpr double kRayleighMedian = 1.1774;  // median length of a 2-D vector with unit variance per axis
 constexpr double kMaxOdometry_m = 1e8;      // farther than round the Earth; squares stay finite

@@ -13,6 +13,8 @@ namespace {
 constexpr double kHistory_s = 10.0;
 constexpr std::size_t kMaxWaitingFixes = 1000;
 constexpr double kLeastClusterMass = 0.5;
+/// Fixes closer together than this share their error: for the start they count as one.
+constexpr double kStartFixInterval_s = 1.0;
 
 std::string seconds_text(double seconds) {
   std::ostringstream out;
@@ -67,7 +69,7 @@ LocalizationPipeline::LocalizationPipeline(const LocalizationParameters& paramet
 void LocalizationPipeline::reset(const std::string& why) {
   if (!why.empty()) event(PipelineEvent::Level::kWarn, "reset: " + why);
   datum_initializer_.reset();
-  heading_initializer_.reset();
+  forget_start();
   history_.clear();
   odometry_stamps_.reset();
   fix_stamps_.reset();
@@ -179,9 +181,10 @@ void LocalizationPipeline::add_odometry(const OdometrySample& sample) {
   const double elapsed_s = last_odometry_ ? to_seconds(sample.stamp - last_odometry_->stamp) : 0.0;
   const Twist2 twist = with_imu(sample, last_odometry_ ? last_odometry_->stamp : sample.stamp);
   if (elapsed_s > parameters_.odometry_gap) {
-    event(PipelineEvent::Level::kWarn, "no odometry for " + seconds_text(elapsed_s) + (initialized_ ? ": place unknown, starting anew from the fixes" : ""));
+    event(PipelineEvent::Level::kWarn, "no odometry for " + seconds_text(elapsed_s) +
+                                           (initialized_ ? ": place unknown, starting anew from the fixes" : ""));
     history_.clear();
-    heading_initializer_.reset();
+    forget_start();
     lost_ = lost_ || initialized_;
     initialized_ = false;
   }
@@ -303,16 +306,17 @@ void LocalizationPipeline::correct_with(const PendingFix& pending, double radius
 }
 
 void LocalizationPipeline::initialize_with(const PendingFix& pending) {
-  const auto at_fix = history_.pose_at(pending.fix.stamp);
-  const Eigen::Vector2d offset = antenna_offset();
-  const Pose2 antenna{offset.x(), offset.y(), 0.0};
-  heading_initializer_.add(compose(*at_fix, antenna), pending.fix);
   FixVerdict verdict = pending.sanitation;
   verdict.decision = FixDecision::kNotExamined;
   verdict.reason = "used for the start";
   last_verdict_ = verdict;
   verdicts_.push_back(verdict);
+  if (last_start_fix_ && to_seconds(pending.fix.stamp - *last_start_fix_) < kStartFixInterval_s) return;
+  last_start_fix_ = pending.fix.stamp;
 
+  const Eigen::Vector2d offset = antenna_offset();
+  const Pose2 antenna{offset.x(), offset.y(), 0.0};
+  heading_initializer_.add(compose(*history_.pose_at(pending.fix.stamp), antenna), pending.fix);
   std::optional<PoseEstimate> found = heading_initializer_.estimate();
   std::string how = "fixes and motion";
   if (!found && heading_initializer_.timed_out()) {
@@ -320,6 +324,8 @@ void LocalizationPipeline::initialize_with(const PendingFix& pending) {
     how = "fixes, heading unknown";
   }
   if (!found) return;
+  // The mean of the fixes is no better than their common error, which their scatter does not show.
+  found->covariance.topLeftCorner<2, 2>() += pending.fix.covariance;
   const Pose2 since = *history_.motion_between(pending.fix.stamp, history_.latest());
   found->pose = compose(compose(found->pose, inverse(antenna)), since);
   last_used_ = pending.fix.stamp;
@@ -331,13 +337,18 @@ void LocalizationPipeline::start(const PoseEstimate& pose, const std::string& ho
   initialized_ = true;
   lost_ = false;
   start_.reset();
-  heading_initializer_.reset();
+  forget_start();
   last_radius_m_ = 0.0;
   std::ostringstream text;
   text.precision(4);
   text << "started from " << how << ": x " << pose.pose.x << " m, y " << pose.pose.y << " m, yaw " << pose.pose.yaw
        << " rad";
   event(PipelineEvent::Level::kInfo, text.str());
+}
+
+void LocalizationPipeline::forget_start() {
+  heading_initializer_.reset();
+  last_start_fix_.reset();
 }
 
 void LocalizationPipeline::decide(FixVerdict verdict) {
@@ -356,7 +367,7 @@ void LocalizationPipeline::guard_against_non_finite() {
   event(PipelineEvent::Level::kError, "the estimate is not finite: starting anew from the fixes");
   initialized_ = false;
   lost_ = true;
-  heading_initializer_.reset();
+  forget_start();
 }
 
 void LocalizationPipeline::event(PipelineEvent::Level level, const std::string& text) {

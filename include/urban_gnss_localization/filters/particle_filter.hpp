@@ -19,7 +19,7 @@ EnumNames<ParticleFilterMode> enum_names(ParticleFilterMode);
 
 /// A choice that the mode makes unless it is made explicitly.
 enum class LikelihoodChoice { kAuto, kPrinted, kSum, kProduct };
-enum class Switch { kAuto, kOn, kOff };
+enum class Switch { kAuto, kAlways, kNever };  // YAML 1.1 reads "on" and "off" as booleans
 enum class EstimateMethod { kMean, kHeaviestCluster };
 EnumNames<LikelihoodChoice> enum_names(LikelihoodChoice);
 EnumNames<Switch> enum_names(Switch);

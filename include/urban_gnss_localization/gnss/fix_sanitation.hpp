@@ -56,8 +56,8 @@ bool is_usable_position(const RawFix& raw);
 /// The covariance is the declared horizontal block times `fix_covariance_scale`; its off-diagonal elements are not
 /// declared, and not used, where the type is kDiagonalKnown. Where the type is kUnknown, or the block is not finite or
 /// not positive definite (all zero, say), it is that of `fix_sigma_default`. Else the axes of its ellipse are clamped
-/// to the floor and the ceiling, each in its own direction. The decision is kInflated where the default or the floor was
-/// used, else kAccepted; verdict.covariance_clamped tells of all three.
+/// to the floor and the ceiling, each in its own direction. The decision is kInflated where the default or the floor
+/// was used, else kAccepted; verdict.covariance_clamped tells of all three.
 ///
 /// `last_stamp` is the stamp of the fix handled last, nothing at the start. Requires parameters without faults.
 SanitizedFix sanitize_fix(const RawFix& raw, const LocalFrame& frame, std::optional<Stamp> last_stamp,

@@ -48,20 +48,21 @@ class HeadingInitializer {
   explicit HeadingInitializer(HeadingInitializerParameters parameters);
 
   /// `odometry_pose_at_fix` is the pose in the odometry's frame, at the fix's stamp, of the point whose position the
-  /// fix is: the base, or the antenna if its offset is composed with the base's pose. Ignored where something is not finite,
-  /// the odometry is absurdly far from its origin (1e8 m), the variance is not positive or the stamp is not newer than
-  /// the last.
+  /// fix is: the base, or the antenna if its offset is composed with the base's pose. Ignored where something is not
+  /// finite, the odometry is absurdly far from its origin (1e8 m), the variance is not positive or the stamp is not
+  /// newer than the last.
   void add(const Pose2& odometry_pose_at_fix, const LocalFix& fix);
 
-  /// The pose in the map frame, of the same point as in add(), at the last fix's stamp; its position is the alignment's,
-  /// not that fix's. Nothing until the yaw's standard deviation is below the limit, at least 4 fixes agree, and the
-  /// robot has been farther than 2 s from where the window begins (a distance, not a length of path: the jitter of a
-  /// parked robot's odometry adds up to a long path).
+  /// The pose in the map frame, of the same point as in add(), at the last fix's stamp; its position is the
+  /// alignment's, not that fix's. Nothing until the yaw's standard deviation is below the limit, at least 4 fixes
+  /// agree, and the robot has been farther than 2 s from where the window begins (a distance, not a length of path: the
+  /// jitter of a parked robot's odometry adds up to a long path).
   std::optional<PoseEstimate> estimate() const;
 
   /// A start without a heading: the position at the last fix, yaw 0 with the variance of a uniform one (pi²/3). The
-  /// position is that of the latest fix that agrees with the others, and its covariance is enlarged by the way travelled
-  /// since then; where fewer than 4 agree it is that of the last fix. Throws std::logic_error where there is no fix.
+  /// position is that of the latest fix that agrees with the others, and its covariance is enlarged by the way
+  /// travelled since then; where fewer than 4 agree it is that of the last fix. Throws std::logic_error where there is
+  /// no fix.
   PoseEstimate without_heading() const;
 
   /// The fixes since start or reset span `initialization_timeout`.

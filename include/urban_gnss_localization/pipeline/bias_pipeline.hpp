@@ -40,6 +40,8 @@ class BiasPipeline {
   explicit BiasPipeline(const BiasPipelineParameters& parameters);
 
   void set_datum(const GeodeticPosition& datum);
+  /// Sets the antenna's place in the base frame (m), e.g. as tf says it. Requires finite numbers.
+  void set_antenna_offset(const Eigen::Vector2d& offset) { parameters_.antenna_offset = {offset.x(), offset.y()}; }
   void add_odometry(const OdometrySample& sample);
   /// The localizer's estimate of the base in the map frame.
   void add_estimate(Stamp stamp, const Pose2& pose);

@@ -122,6 +122,9 @@ class LocalizationPipeline {
   /// is no such place.
   void set_datum(const GeodeticPosition& datum);
 
+  /// Sets the antenna's place in the base frame (m), e.g. as tf says it. Requires finite numbers.
+  void set_antenna_offset(const Eigen::Vector2d& offset) { parameters_.antenna_offset = {offset.x(), offset.y()}; }
+
   /// Forgets everything but parameters and a datum that was set.
   void reset(const std::string& why);
 
@@ -152,6 +155,7 @@ class LocalizationPipeline {
   bool process_next_fix();
   void initialize_with(const PendingFix& pending);
   void start(const PoseEstimate& pose, const std::string& how);
+  void forget_start();
   void correct_with(const PendingFix& pending, double radius_m);
   void decide(FixVerdict verdict);
   void guard_against_non_finite();
@@ -178,6 +182,7 @@ class LocalizationPipeline {
   std::deque<RawFix> before_datum_;
   std::deque<PendingFix> pending_;
   std::optional<Stamp> last_fix_stamp_;
+  std::optional<Stamp> last_start_fix_;  ///< that the initial pose is being found from
   std::deque<BiasEstimate> biases_;
   double last_radius_m_{0.0};
 

@@ -1,0 +1,80 @@
+#pragma once
+
+#include <geometry_msgs/PoseArray.h>
+#include <geometry_msgs/PoseWithCovariance.h>
+#include <geometry_msgs/TransformStamped.h>
+#include <nav_msgs/Odometry.h>
+#include <ros/time.h>
+#include <sensor_msgs/Imu.h>
+#include <sensor_msgs/NavSatFix.h>
+#include <sensor_msgs/PointCloud2.h>
+#include <urban_gnss_localization/FixDecision.h>
+#include <urban_gnss_localization/GpsBias.h>
+#include <urban_gnss_localization/LocalizationStatus.h>
+
+#include <optional>
+#include <string>
+
+#include "urban_gnss_localization/evaluation/trajectory.hpp"
+#include "urban_gnss_localization/filters/bias_kalman_filter.hpp"
+#include "urban_gnss_localization/filters/particle_set.hpp"
+#include "urban_gnss_localization/pipeline/localization_pipeline.hpp"
+
+/// Between messages and the core's types. Nothing here decides or computes anything of its own.
+namespace urban_gnss {
+
+/// Names of REP-105's frames.
+struct Frames {
+  std::string map{"map"};
+  std::string odom{"odom"};
+  std::string base_link{"base_link"};
+
+  template <class V>
+  void visit(V& v) {
+    v("map_frame", map);
+    v("odom_frame", odom);
+    v("base_link_frame", base_link);
+  }
+  void check(std::vector<std::string>& faults) const;
+};
+
+Stamp to_stamp(const ros::Time& time);
+/// Requires a stamp that ROS can express (0 to 2^32 s); others are clamped.
+ros::Time to_ros(Stamp stamp);
+
+RawFix to_raw_fix(const sensor_msgs::NavSatFix& message);
+sensor_msgs::NavSatFix to_message(const GeodeticPosition& datum, const ros::Time& time, const std::string& frame);
+GeodeticPosition to_geodetic(const sensor_msgs::NavSatFix& message);
+
+OdometrySample to_odometry_sample(const nav_msgs::Odometry& message);
+/// Yaw rate about the vertical: the angular velocity turned by the orientation where the message has one (an IMU may be
+/// mounted at any angle), else its z axis. Nothing where it is not finite or said not to be there.
+std::optional<double> to_yaw_rate(const sensor_msgs::Imu& message);
+/// Planar part; yaw NaN where the quaternion has no direction.
+Pose2 to_pose2(const geometry_msgs::Pose& pose);
+geometry_msgs::Pose to_message(const Pose2& pose);
+PoseEstimate to_pose_estimate(const geometry_msgs::PoseWithCovariance& message);
+TimedPose to_timed_pose(const nav_msgs::Odometry& message);
+
+/// Pose in the map frame and twist in the base frame; what a planar filter does not estimate (z, roll, pitch) has the
+/// variance `kUnobservedVariance` (F14).
+nav_msgs::Odometry to_message(const LocalizationOutput& output, const Frames& frames);
+inline constexpr double kUnobservedVariance = 1e6;
+
+/// map -> odom, valid until `offset_s` after the output's stamp.
+geometry_msgs::TransformStamped to_map_to_odom(const LocalizationOutput& output, const Frames& frames, double offset_s);
+geometry_msgs::TransformStamped to_transform(const Pose2& pose, const ros::Time& time, const std::string& parent,
+                                             const std::string& child);
+
+urban_gnss_localization::FixDecision to_message(const FixVerdict& verdict);
+FixVerdict to_verdict(const urban_gnss_localization::FixDecision& message);
+urban_gnss_localization::GpsBias to_message(const BiasEstimate& bias, const std::string& map_frame);
+BiasEstimate to_bias_estimate(const urban_gnss_localization::GpsBias& message);
+urban_gnss_localization::LocalizationStatus to_message(const LocalizationReport& report, const Localizer& localizer,
+                                                       const ros::Time& time, const std::string& map_frame);
+
+geometry_msgs::PoseArray to_pose_array(const ParticleSet& particles, const ros::Time& time, const std::string& frame);
+/// Fields x, y, z (m; z = 0), yaw (rad), weight (sums to 1), intensity (weight relative to the heaviest, 0 to 1).
+sensor_msgs::PointCloud2 to_point_cloud(const ParticleSet& particles, const ros::Time& time, const std::string& frame);
+
+}  // namespace urban_gnss

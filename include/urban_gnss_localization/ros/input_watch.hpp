@@ -1,0 +1,32 @@
+#pragma once
+
+#include <ros/node_handle.h>
+#include <ros/subscriber.h>
+
+#include <string>
+
+namespace urban_gnss {
+
+/// Watches one subscribed topic for what goes wrong in a graph: two publishers at once, a frame that changes (F9). Says
+/// each once a change.
+class InputWatch {
+ public:
+  void set_subscriber(const ros::Subscriber& subscriber) { subscriber_ = subscriber; }
+  std::string topic() const { return subscriber_.getTopic(); }
+  std::uint32_t publishers() const { return subscriber_.getNumPublishers(); }
+
+  /// To be called with each message's frame.
+  void observe_frame(const std::string& frame);
+  /// To be called now and then.
+  void check_publishers();
+
+  const std::string& frame() const { return frame_; }
+
+ private:
+  ros::Subscriber subscriber_;
+  std::string frame_;
+  bool has_frame_{false};
+  bool warned_of_publishers_{false};
+};
+
+}  // namespace urban_gnss

@@ -1,0 +1,112 @@
+#pragma once
+
+#include <diagnostic_updater/diagnostic_updater.h>
+#include <geometry_msgs/PoseWithCovarianceStamped.h>
+#include <nav_msgs/Odometry.h>
+#include <ros/ros.h>
+#include <sensor_msgs/Imu.h>
+#include <sensor_msgs/NavSatFix.h>
+#include <std_srvs/Empty.h>
+#include <tf2_ros/buffer.h>
+#include <tf2_ros/transform_broadcaster.h>
+#include <tf2_ros/transform_listener.h>
+#include <urban_gnss_localization/FromLL.h>
+#include <urban_gnss_localization/GpsBias.h>
+#include <urban_gnss_localization/SetDatum.h>
+#include <urban_gnss_localization/SetPose.h>
+#include <urban_gnss_localization/ToLL.h>
+
+#include <functional>
+#include <memory>
+
+#include "urban_gnss_localization/pipeline/localization_pipeline.hpp"
+#include "urban_gnss_localization/ros/conversions.hpp"
+#include "urban_gnss_localization/ros/input_watch.hpp"
+
+namespace urban_gnss {
+
+/// Parameters that every localizer node has beside its filter's.
+struct LocalizerNodeParameters {
+  Frames frames;
+  bool publish_tf{true};
+  double transform_time_offset{0.0};  ///< s, added to the stamp of map -> odom
+  bool antenna_offset_from_tf{true};  ///< antenna_offset from base_link_frame -> the fix's frame_id, where tf has it
+  LocalizationParameters localization;
+
+  template <class V>
+  void visit(V& v) {
+    frames.visit(v);
+    v("publish_tf", publish_tf);
+    v("transform_time_offset", transform_time_offset, any_number());
+    v("antenna_offset_from_tf", antenna_offset_from_tf);
+    localization.visit(v);
+  }
+  void check(std::vector<std::string>& faults) const {
+    frames.check(faults);
+    localization.check(faults);
+  }
+};
+
+/// The shell of every localizer: topics, services, tf, status and diagnostics around a LocalizationPipeline. A localizer
+/// node makes its filter, hands it over and, where it has more to show, publishes that in `on_output`.
+///
+/// Subscribes odom, gps/fix, initialpose, gps/datum; gps/bias where the filter wants it; imu/data where
+/// use_imu_yaw_rate is set. Publishes odometry/filtered, tf map -> odom, ~status, and gps/datum (latched) where it found
+/// the datum itself. Services set_pose, datum, toLL, fromLL, ~reset.
+class LocalizerNode {
+ public:
+  using OutputHook = std::function<void(const LocalizationOutput&)>;
+
+  LocalizerNode(ros::NodeHandle& node, ros::NodeHandle& private_node, const LocalizerNodeParameters& parameters,
+                std::unique_ptr<Localizer> localizer, OutputHook on_output = {});
+
+  const LocalizerNodeParameters& parameters() const { return parameters_; }
+
+ private:
+  void on_odometry(const nav_msgs::Odometry& message);
+  void on_fix(const sensor_msgs::NavSatFix& message);
+  void on_imu(const sensor_msgs::Imu& message);
+  void on_bias(const urban_gnss_localization::GpsBias& message);
+  void on_initial_pose(const geometry_msgs::PoseWithCovarianceStamped& message);
+  void on_datum(const sensor_msgs::NavSatFix& message);
+  bool set_pose(urban_gnss_localization::SetPose::Request& request, urban_gnss_localization::SetPose::Response& response);
+  bool set_datum(urban_gnss_localization::SetDatum::Request& request,
+                 urban_gnss_localization::SetDatum::Response& response);
+  bool to_ll(urban_gnss_localization::ToLL::Request& request, urban_gnss_localization::ToLL::Response& response);
+  bool from_ll(urban_gnss_localization::FromLL::Request& request, urban_gnss_localization::FromLL::Response& response);
+  bool reset(std_srvs::Empty::Request& request, std_srvs::Empty::Response& response);
+
+  std::string try_pose(const geometry_msgs::PoseWithCovarianceStamped& message);
+  void publish_results();
+  void publish_datum();
+  void publish_status();
+  void look_up_antenna();
+  void every_second();
+  void every_five_seconds();
+  void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
+
+  LocalizerNodeParameters parameters_;
+  LocalizationPipeline pipeline_;
+  OutputHook on_output_;
+  Stamp newest_input_{0};
+  bool antenna_known_{false};
+  bool antenna_warned_{false};
+  std::uint64_t outputs_{0};
+
+  ros::Publisher estimate_publisher_;
+  ros::Publisher status_publisher_;
+  ros::Publisher datum_publisher_;
+  std::vector<ros::Subscriber> subscribers_;
+  std::vector<ros::ServiceServer> services_;
+  InputWatch odometry_watch_;
+  InputWatch fix_watch_;
+  tf2_ros::TransformBroadcaster broadcaster_;
+  tf2_ros::Buffer tf_buffer_;
+  std::unique_ptr<tf2_ros::TransformListener> tf_listener_;
+  diagnostic_updater::Updater diagnostics_;
+  ros::WallTimer second_timer_;
+  ros::WallTimer five_second_timer_;
+  std::optional<GeodeticPosition> published_datum_;
+};
+
+}  // namespace urban_gnss

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <visualization_msgs/MarkerArray.h>
+
+#include <string>
+#include <vector>
+
+#include "urban_gnss_localization/filters/bias_kalman_filter.hpp"
+#include "urban_gnss_localization/geometry/pose2.hpp"
+
+namespace urban_gnss {
+
+/// The ring of radius r-hat about the predicted antenna (where the fix may lie in the shadow), orange in the shadow and
+/// green otherwise, and the bias as an arrow from there.
+visualization_msgs::MarkerArray bias_markers(const BiasEstimate& bias, const std::string& map_frame);
+
+/// The targets as numbered discs, the current one highlighted.
+visualization_msgs::MarkerArray target_markers(const std::vector<Eigen::Vector2d>& targets, std::size_t current,
+                                               const ros::Time& time, const std::string& map_frame);
+
+/// The shadow as a dark plate over the half-plane x < border within `extent_m` of the origin, and the true robot as a
+/// box of one wheelbase.
+visualization_msgs::MarkerArray field_markers(double shadow_border_m, double extent_m, const Pose2& truth,
+                                              double wheelbase_m, const ros::Time& time, const std::string& map_frame);
+
+}  // namespace urban_gnss

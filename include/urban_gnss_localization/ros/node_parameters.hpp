@@ -1,0 +1,30 @@
+#pragma once
+
+#include <ros/node_handle.h>
+#include <yaml-cpp/yaml.h>
+
+#include <functional>
+
+#include "urban_gnss_localization/common/parameters.hpp"
+
+namespace urban_gnss {
+
+/// The node's private parameters as one YAML map, so that nodes and offline tools read the same structs in the same way.
+YAML::Node private_parameters(const ros::NodeHandle& private_node);
+
+/// Reads structs out of the node's private parameters. Throws ParameterError with every fault of all of them.
+template <class... P>
+void read_private_parameters(const ros::NodeHandle& private_node, P&... parameters) {
+  ParameterReader reader(private_parameters(private_node));
+  reader.ignore("diagnostic_period");  // diagnostic_updater's own
+  (reader.read(parameters), ...);
+  const auto faults = reader.finish();
+  if (!faults.empty()) throw ParameterError(private_node.getNamespace(), faults);
+}
+
+/// The main function of a node: initialises ROS, makes the node, spins. A node whose parameters are bad, or that fails
+/// otherwise while it is made, says why on the console and exits with 1.
+int run_node(int argc, char** argv, const std::string& name,
+             const std::function<std::shared_ptr<void>(ros::NodeHandle&, ros::NodeHandle&)>& make);
+
+}  // namespace urban_gnss

@@ -1,0 +1,114 @@
+// The bias Kalman filter of Nishida et al. as a node: gps/fix, odom, odometry/filtered and gps/datum in, gps/bias out.
+// Parameters: BiasPipelineParameters, Frames; config/gps_bias.yaml documents each.
+
+#include <diagnostic_updater/diagnostic_updater.h>
+#include <nav_msgs/Odometry.h>
+#include <ros/ros.h>
+#include <sensor_msgs/NavSatFix.h>
+#include <visualization_msgs/MarkerArray.h>
+
+#include <cmath>
+
+#include "urban_gnss_localization/pipeline/bias_pipeline.hpp"
+#include "urban_gnss_localization/ros/conversions.hpp"
+#include "urban_gnss_localization/ros/event_log.hpp"
+#include "urban_gnss_localization/ros/markers.hpp"
+#include "urban_gnss_localization/ros/node_parameters.hpp"
+#include "urban_gnss_localization/ros/topics.hpp"
+
+using namespace urban_gnss;
+
+namespace {
+
+class GpsBiasNode {
+ public:
+  GpsBiasNode(ros::NodeHandle& node, ros::NodeHandle& private_node)
+      : pipeline_(read(private_node)), diagnostics_(ros::NodeHandle(), private_node) {
+    bias_publisher_ = node.advertise<urban_gnss_localization::GpsBias>(topics::kBias, 100);
+    marker_publisher_ = node.advertise<visualization_msgs::MarkerArray>(topics::kBiasMarkers, 2);
+    const ros::TransportHints no_delay = ros::TransportHints().tcpNoDelay();
+    subscribers_ = {
+        node.subscribe(topics::kDatum, 10, &GpsBiasNode::on_datum, this),
+        node.subscribe(topics::kOdometry, 1000, &GpsBiasNode::on_odometry, this, no_delay),
+        node.subscribe(topics::kEstimate, 1000, &GpsBiasNode::on_estimate, this, no_delay),
+        node.subscribe(topics::kFix, 100, &GpsBiasNode::on_fix, this, no_delay),
+    };
+    diagnostics_.setHardwareID("none");
+    diagnostics_.add("gps bias", this, &GpsBiasNode::diagnose);
+    second_timer_ = node.createWallTimer(ros::WallDuration(1.0),
+                                         [this](const ros::WallTimerEvent&) { diagnostics_.force_update(); });
+    five_second_timer_ = node.createWallTimer(ros::WallDuration(5.0), [this](const ros::WallTimerEvent&) {
+      const std::string missing = pipeline_.waiting_for();
+      if (!missing.empty()) ROS_WARN_STREAM("waiting for " << missing);
+    });
+  }
+
+ private:
+  BiasPipelineParameters read(const ros::NodeHandle& private_node) {
+    BiasPipelineParameters parameters;
+    read_private_parameters(private_node, frames_, parameters);
+    return parameters;
+  }
+
+  void on_datum(const sensor_msgs::NavSatFix& message) {
+    try {
+      pipeline_.set_datum(to_geodetic(message));
+    } catch (const std::invalid_argument& error) {
+      ROS_ERROR_STREAM(topics::kDatum << " refused: " << error.what());
+    }
+    publish();
+  }
+  void on_odometry(const nav_msgs::Odometry& message) {
+    pipeline_.add_odometry(to_odometry_sample(message));
+    publish();
+  }
+  void on_estimate(const nav_msgs::Odometry& message) {
+    pipeline_.add_estimate(to_stamp(message.header.stamp), to_pose2(message.pose.pose));
+    publish();
+  }
+  void on_fix(const sensor_msgs::NavSatFix& message) {
+    pipeline_.add_fix(to_raw_fix(message));
+    publish();
+  }
+
+  void publish() {
+    log_events(pipeline_.take_events());
+    for (const BiasEstimate& bias : pipeline_.take_estimates()) {
+      bias_publisher_.publish(to_message(bias, frames_.map));
+      if (marker_publisher_.getNumSubscribers() > 0) marker_publisher_.publish(bias_markers(bias, frames_.map));
+      last_ = bias;
+    }
+  }
+
+  void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
+    const std::string missing = pipeline_.waiting_for();
+    using diagnostic_msgs::DiagnosticStatus;
+    if (!missing.empty()) {
+      status.summary(DiagnosticStatus::WARN, "waiting for " + missing);
+    } else {
+      status.summary(DiagnosticStatus::OK, last_.in_shadow ? "in shadow" : "direct reception");
+    }
+    status.add("bias radius (m)", last_.radius_m);
+    status.add("shadow statistic", last_.shadow_statistic);
+    status.add("last fix", to_string(last_.verdict.decision));
+    status.add("last NIS", last_.verdict.nis);
+  }
+
+  Frames frames_;
+  BiasPipeline pipeline_;
+  BiasEstimate last_;
+  ros::Publisher bias_publisher_;
+  ros::Publisher marker_publisher_;
+  std::vector<ros::Subscriber> subscribers_;
+  diagnostic_updater::Updater diagnostics_;
+  ros::WallTimer second_timer_;
+  ros::WallTimer five_second_timer_;
+};
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  return run_node(argc, argv, "gps_bias", [](ros::NodeHandle& node, ros::NodeHandle& private_node) {
+    return std::make_shared<GpsBiasNode>(node, private_node);
+  });
+}

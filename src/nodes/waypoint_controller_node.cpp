@@ -1,0 +1,126 @@
+// The steering law of Nishida et al. as a node: odometry/filtered in, cmd_vel out. Parameters:
+// WaypointControllerParameters and the two below; config/waypoint_controller.yaml documents each.
+
+#include <geometry_msgs/Twist.h>
+#include <nav_msgs/Odometry.h>
+#include <nav_msgs/Path.h>
+#include <ros/ros.h>
+
+#include "urban_gnss_localization/control/waypoint_controller.hpp"
+#include "urban_gnss_localization/pipeline/stamp_monitor.hpp"
+#include "urban_gnss_localization/ros/conversions.hpp"
+#include "urban_gnss_localization/ros/markers.hpp"
+#include "urban_gnss_localization/ros/node_parameters.hpp"
+#include "urban_gnss_localization/ros/topics.hpp"
+
+using namespace urban_gnss;
+
+namespace {
+
+constexpr double kTimeJump_s = 1.0;
+
+struct NodeParameters {
+  int first_target{0};           ///< index of the target to steer for first
+  double estimate_timeout{0.5};  ///< s of wall time without an estimate after which the robot is stopped
+
+  template <class V>
+  void visit(V& v) {
+    v("first_target", first_target, non_negative());
+    v("estimate_timeout", estimate_timeout, positive());
+  }
+  void check(std::vector<std::string>&) const {}
+};
+
+class WaypointControllerNode {
+ public:
+  WaypointControllerNode(ros::NodeHandle& node, ros::NodeHandle& private_node)
+      : controller_(read(private_node)), stamps_(kTimeJump_s) {
+    command_publisher_ = node.advertise<geometry_msgs::Twist>(topics::kCommand, 10);
+    target_publisher_ = node.advertise<visualization_msgs::MarkerArray>(topics::kTargets, 1, true);
+    path_publisher_ = node.advertise<nav_msgs::Path>(topics::kTargetPath, 1, true);
+    subscriber_ = node.subscribe(topics::kEstimate, 100, &WaypointControllerNode::on_estimate, this,
+                                 ros::TransportHints().tcpNoDelay());
+    watchdog_ = node.createWallTimer(ros::WallDuration(parameters_.estimate_timeout),
+                                     [this](const ros::WallTimerEvent&) { stop_if_blind(); });
+    if (controller_.targets().empty()) ROS_WARN_STREAM("no targets: the robot will stand");
+  }
+
+ private:
+  WaypointController read(const ros::NodeHandle& private_node) {
+    read_private_parameters(private_node, steering_, parameters_);
+    return WaypointController(steering_, static_cast<std::size_t>(parameters_.first_target));
+  }
+
+  void on_estimate(const nav_msgs::Odometry& message) {
+    const Pose2 estimate = to_pose2(message.pose.pose);
+    const Stamp stamp = to_stamp(message.header.stamp);
+    if (!is_finite(estimate)) return;
+    switch (stamps_.observe(stamp)) {
+      case StampMonitor::Order::kNotNewer: return;
+      case StampMonitor::Order::kJumpedBack:
+        ROS_WARN_STREAM("reset: the clock of the estimate jumped back");
+        controller_ = WaypointController(steering_, static_cast<std::size_t>(parameters_.first_target));
+        stamps_.reset();
+        stamps_.observe(stamp);
+        shown_.reset();
+        break;
+      case StampMonitor::Order::kNewer: break;
+    }
+    const bool was_finished = controller_.finished();
+    const BicycleInput input = controller_.steer(estimate);
+    geometry_msgs::Twist command;
+    command.linear.x = input.speed_mps;
+    command.angular.z = yaw_rate(input, steering_.wheelbase);
+    command_publisher_.publish(command);
+    is_driving_ = true;
+    seen_since_check_ = true;
+    if (!was_finished && controller_.finished()) ROS_INFO_STREAM("all laps are done");
+    if (shown_ != controller_.current_target()) show_targets(message.header);
+  }
+
+  void show_targets(const std_msgs::Header& header) {
+    shown_ = controller_.current_target();
+    target_publisher_.publish(
+        target_markers(controller_.targets(), controller_.current_target(), header.stamp, header.frame_id));
+    nav_msgs::Path path;
+    path.header = header;
+    for (std::size_t i = 0; i <= controller_.targets().size() && !controller_.targets().empty(); ++i) {
+      const Eigen::Vector2d& target = controller_.targets()[i % controller_.targets().size()];
+      geometry_msgs::PoseStamped pose;
+      pose.header = header;
+      pose.pose = to_message(Pose2{target.x(), target.y(), 0.0});
+      path.poses.push_back(pose);
+    }
+    path_publisher_.publish(path);
+  }
+
+  void stop_if_blind() {
+    if (is_driving_ && !seen_since_check_) {
+      ROS_WARN_STREAM("no estimate for " << parameters_.estimate_timeout << " s: the robot is stopped");
+      command_publisher_.publish(geometry_msgs::Twist());
+      is_driving_ = false;
+    }
+    seen_since_check_ = false;
+  }
+
+  WaypointControllerParameters steering_;
+  NodeParameters parameters_;
+  WaypointController controller_;
+  StampMonitor stamps_;
+  std::optional<std::size_t> shown_;
+  bool is_driving_{false};
+  bool seen_since_check_{false};
+  ros::Publisher command_publisher_;
+  ros::Publisher target_publisher_;
+  ros::Publisher path_publisher_;
+  ros::Subscriber subscriber_;
+  ros::WallTimer watchdog_;
+};
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  return run_node(argc, argv, "waypoint_controller", [](ros::NodeHandle& node, ros::NodeHandle& private_node) {
+    return std::make_shared<WaypointControllerNode>(node, private_node);
+  });
+}

@@ -1,0 +1,275 @@
+#include "urban_gnss_localization/ros/localizer_node.hpp"
+
+#include <tf2/exceptions.h>
+
+#include <cmath>
+#include <utility>
+
+#include "urban_gnss_localization/ros/event_log.hpp"
+#include "urban_gnss_localization/ros/topics.hpp"
+
+namespace urban_gnss {
+namespace {
+
+const ros::TransportHints kNoDelay = ros::TransportHints().tcpNoDelay();
+
+}  // namespace
+
+LocalizerNode::LocalizerNode(ros::NodeHandle& node, ros::NodeHandle& private_node,
+                             const LocalizerNodeParameters& parameters, std::unique_ptr<Localizer> localizer,
+                             OutputHook on_output)
+    : parameters_(parameters),
+      pipeline_(parameters.localization, std::move(localizer)),
+      on_output_(std::move(on_output)),
+      diagnostics_(ros::NodeHandle(), private_node) {
+  estimate_publisher_ = node.advertise<nav_msgs::Odometry>(topics::kEstimate, 100);
+  status_publisher_ = private_node.advertise<urban_gnss_localization::LocalizationStatus>(topics::kStatus, 100);
+  datum_publisher_ = node.advertise<sensor_msgs::NavSatFix>(topics::kDatum, 1, true);
+
+  using Self = LocalizerNode;
+  subscribers_.push_back(node.subscribe(topics::kOdometry, 1000, &Self::on_odometry, this, kNoDelay));
+  odometry_watch_.set_subscriber(subscribers_.back());
+  subscribers_.push_back(node.subscribe(topics::kFix, 100, &Self::on_fix, this, kNoDelay));
+  fix_watch_.set_subscriber(subscribers_.back());
+  subscribers_.push_back(node.subscribe(topics::kInitialPose, 10, &Self::on_initial_pose, this));
+  subscribers_.push_back(node.subscribe(topics::kDatum, 10, &Self::on_datum, this));
+  if (pipeline_.localizer().wants_bias()) {
+    subscribers_.push_back(node.subscribe(topics::kBias, 100, &Self::on_bias, this, kNoDelay));
+  }
+  if (parameters_.localization.use_imu_yaw_rate) {
+    subscribers_.push_back(node.subscribe(topics::kImu, 1000, &Self::on_imu, this, kNoDelay));
+  }
+  services_.push_back(node.advertiseService("set_pose", &Self::set_pose, this));
+  services_.push_back(node.advertiseService("datum", &Self::set_datum, this));
+  services_.push_back(node.advertiseService("toLL", &Self::to_ll, this));
+  services_.push_back(node.advertiseService("fromLL", &Self::from_ll, this));
+  services_.push_back(private_node.advertiseService("reset", &Self::reset, this));
+
+  const Eigen::Vector2d offset(parameters_.localization.antenna_offset[0], parameters_.localization.antenna_offset[1]);
+  antenna_known_ = !parameters_.antenna_offset_from_tf || offset.norm() > 0.0;
+  if (!antenna_known_) tf_listener_ = std::make_unique<tf2_ros::TransformListener>(tf_buffer_);
+
+  diagnostics_.setHardwareID("none");
+  diagnostics_.add("localization", this, &Self::diagnose);
+  second_timer_ = node.createWallTimer(ros::WallDuration(1.0), [this](const ros::WallTimerEvent&) { every_second(); });
+  five_second_timer_ =
+      node.createWallTimer(ros::WallDuration(5.0), [this](const ros::WallTimerEvent&) { every_five_seconds(); });
+  publish_results();
+}
+
+void LocalizerNode::on_odometry(const nav_msgs::Odometry& message) {
+  odometry_watch_.observe_frame(message.header.frame_id);
+  newest_input_ = to_stamp(message.header.stamp);
+  pipeline_.add_odometry(to_odometry_sample(message));
+  publish_results();
+}
+
+void LocalizerNode::on_fix(const sensor_msgs::NavSatFix& message) {
+  fix_watch_.observe_frame(message.header.frame_id);
+  pipeline_.add_fix(to_raw_fix(message));
+  publish_results();
+}
+
+void LocalizerNode::on_imu(const sensor_msgs::Imu& message) {
+  if (const auto rate = to_yaw_rate(message)) pipeline_.add_imu_yaw_rate(to_stamp(message.header.stamp), *rate);
+}
+
+void LocalizerNode::on_bias(const urban_gnss_localization::GpsBias& message) {
+  if (!std::isfinite(message.radius) || message.radius < 0.0) {
+    ROS_WARN_STREAM_THROTTLE(5.0, "gps/bias left out: radius is not a finite length");
+    return;
+  }
+  pipeline_.add_bias(to_bias_estimate(message));
+  publish_results();
+}
+
+std::string LocalizerNode::try_pose(const geometry_msgs::PoseWithCovarianceStamped& message) {
+  if (!message.header.frame_id.empty() && message.header.frame_id != parameters_.frames.map) {
+    return "pose is in frame '" + message.header.frame_id + "', must be in '" + parameters_.frames.map + "'";
+  }
+  try {
+    pipeline_.set_pose(to_pose_estimate(message.pose));
+  } catch (const std::invalid_argument& error) {
+    return error.what();
+  }
+  publish_results();
+  return {};
+}
+
+void LocalizerNode::on_initial_pose(const geometry_msgs::PoseWithCovarianceStamped& message) {
+  const std::string fault = try_pose(message);
+  if (!fault.empty()) ROS_ERROR_STREAM("initialpose refused: " << fault);
+}
+
+bool LocalizerNode::set_pose(urban_gnss_localization::SetPose::Request& request,
+                             urban_gnss_localization::SetPose::Response& response) {
+  response.message = try_pose(request.pose);
+  response.success = response.message.empty();
+  return true;
+}
+
+void LocalizerNode::on_datum(const sensor_msgs::NavSatFix& message) {
+  const GeodeticPosition datum = to_geodetic(message);
+  if (pipeline_.frame()) {
+    const GeodeticPosition& known = pipeline_.frame()->datum();
+    if (datum.latitude_deg != known.latitude_deg || datum.longitude_deg != known.longitude_deg) {
+      ROS_WARN_STREAM_THROTTLE(5.0, topics::kDatum << ": left out, there is a datum already; use the service datum");
+    }
+    return;
+  }
+  try {
+    pipeline_.set_datum(datum);
+    published_datum_ = datum;  // it came from the topic: no echo
+  } catch (const std::invalid_argument& error) {
+    ROS_ERROR_STREAM(topics::kDatum << " refused: " << error.what());
+  }
+  publish_results();
+}
+
+bool LocalizerNode::set_datum(urban_gnss_localization::SetDatum::Request& request,
+                              urban_gnss_localization::SetDatum::Response& response) {
+  try {
+    pipeline_.set_datum({request.latitude, request.longitude, request.altitude});
+    response.success = true;
+  } catch (const std::invalid_argument& error) {
+    response.success = false;
+    response.message = error.what();
+  }
+  publish_results();
+  return true;
+}
+
+bool LocalizerNode::to_ll(urban_gnss_localization::ToLL::Request& request,
+                          urban_gnss_localization::ToLL::Response& response) {
+  if (!pipeline_.frame()) {
+    response.message = "there is no datum yet";
+    return true;
+  }
+  const GeodeticPosition place =
+      pipeline_.frame()->to_geodetic({request.map_point.x, request.map_point.y, request.map_point.z});
+  response.success = std::isfinite(place.latitude_deg);
+  if (!response.success) response.message = "map_point is not finite";
+  response.latitude = place.latitude_deg;
+  response.longitude = place.longitude_deg;
+  response.altitude = place.altitude_m;
+  return true;
+}
+
+bool LocalizerNode::from_ll(urban_gnss_localization::FromLL::Request& request,
+                            urban_gnss_localization::FromLL::Response& response) {
+  if (!pipeline_.frame()) {
+    response.message = "there is no datum yet";
+    return true;
+  }
+  const Eigen::Vector3d point = pipeline_.frame()->to_local({request.latitude, request.longitude, request.altitude});
+  response.success = point.allFinite();
+  if (!response.success) response.message = "there is no such place";
+  response.map_point.x = point.x();
+  response.map_point.y = point.y();
+  response.map_point.z = point.z();
+  return true;
+}
+
+bool LocalizerNode::reset(std_srvs::Empty::Request&, std_srvs::Empty::Response&) {
+  pipeline_.reset("requested");
+  publish_results();
+  return true;
+}
+
+void LocalizerNode::publish_results() {
+  log_events(pipeline_.take_events());
+  publish_datum();
+  for (const LocalizationOutput& output : pipeline_.take_outputs()) {
+    ++outputs_;
+    estimate_publisher_.publish(to_message(output, parameters_.frames));
+    if (parameters_.publish_tf) {
+      broadcaster_.sendTransform(to_map_to_odom(output, parameters_.frames, parameters_.transform_time_offset));
+    }
+    if (on_output_) on_output_(output);
+  }
+  for (const FixVerdict& verdict : pipeline_.take_verdicts()) {
+    if (is_rejected(verdict.decision)) {
+      ROS_WARN_STREAM_THROTTLE(5.0, "fix " << to_string(verdict.decision) << ": " << verdict.reason);
+    }
+    publish_status();
+  }
+}
+
+void LocalizerNode::publish_datum() {
+  if (!pipeline_.frame()) {
+    published_datum_.reset();
+    return;
+  }
+  const GeodeticPosition& datum = pipeline_.frame()->datum();
+  const bool is_published = published_datum_ && published_datum_->latitude_deg == datum.latitude_deg &&
+                            published_datum_->longitude_deg == datum.longitude_deg &&
+                            published_datum_->altitude_m == datum.altitude_m;
+  if (is_published) return;
+  datum_publisher_.publish(to_message(datum, to_ros(newest_input_), parameters_.frames.map));
+  published_datum_ = datum;
+}
+
+void LocalizerNode::publish_status() {
+  status_publisher_.publish(
+      to_message(pipeline_.report(), pipeline_.localizer(), to_ros(newest_input_), parameters_.frames.map));
+}
+
+void LocalizerNode::look_up_antenna() {
+  if (antenna_known_ || fix_watch_.frame().empty()) return;
+  if (fix_watch_.frame() == parameters_.frames.base_link) {
+    antenna_known_ = true;
+    return;
+  }
+  try {
+    const auto transform =
+        tf_buffer_.lookupTransform(parameters_.frames.base_link, fix_watch_.frame(), ros::Time(0));
+    const auto& offset = transform.transform.translation;
+    pipeline_.set_antenna_offset({offset.x, offset.y});
+    ROS_INFO_STREAM("antenna at x " << offset.x << " m, y " << offset.y << " m in " << parameters_.frames.base_link);
+    antenna_known_ = true;
+  } catch (const tf2::TransformException&) {
+    if (!antenna_warned_) {
+      ROS_WARN_STREAM("no tf from " << parameters_.frames.base_link << " to the fix's frame " << fix_watch_.frame()
+                                    << ": the antenna is taken to be at the base until there is one");
+    }
+    antenna_warned_ = true;
+  }
+}
+
+void LocalizerNode::every_second() {
+  look_up_antenna();
+  publish_status();
+  diagnostics_.force_update();
+}
+
+void LocalizerNode::every_five_seconds() {
+  odometry_watch_.check_publishers();
+  fix_watch_.check_publishers();
+  const std::string missing = pipeline_.waiting_for();
+  if (missing.empty()) return;
+  ROS_WARN_STREAM("waiting for " << missing << " (" << odometry_watch_.topic() << ": " << odometry_watch_.publishers()
+                                 << " publishers, " << fix_watch_.topic() << ": " << fix_watch_.publishers() << ")");
+}
+
+void LocalizerNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
+  const LocalizationReport report = pipeline_.report();
+  using diagnostic_msgs::DiagnosticStatus;
+  const auto level = report.healthy                               ? DiagnosticStatus::OK
+                     : report.state == LocalizationState::kLost ? DiagnosticStatus::ERROR
+                                                                  : DiagnosticStatus::WARN;
+  status.summary(level, report.healthy ? "tracking" : report.reason);
+  status.add("state", to_string(report.state));
+  status.add("mode", pipeline_.localizer().mode());
+  status.add("last fix", to_string(report.last_fix.decision));
+  status.add("fixes used", report.fixes_used);
+  status.add("fixes rejected", report.fixes_rejected);
+  status.add("fix age (s)", report.fix_age_s);
+  status.add("position sigma (m)", report.position_sigma_m);
+  status.add("heading sigma (rad)", report.health.heading_sigma_rad);
+  status.add("bias radius (m)", report.bias_radius_m);
+  status.add("effective sample size", report.health.effective_sample_size);
+  status.add("cluster mass", report.health.cluster_mass);
+  status.add("estimates published", outputs_);
+}
+
+}  // namespace urban_gnss

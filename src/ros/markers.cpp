@@ -1,0 +1,106 @@
+#include "urban_gnss_localization/ros/markers.hpp"
+
+#include <cmath>
+
+#include "urban_gnss_localization/ros/conversions.hpp"
+
+namespace urban_gnss {
+namespace {
+
+using visualization_msgs::Marker;
+
+struct Colour {
+  float r, g, b, a;
+};
+
+Marker make_marker(const char* ns, int id, int type, Colour colour, const ros::Time& time, const std::string& frame) {
+  Marker marker;
+  marker.header.frame_id = frame;
+  marker.header.stamp = time;
+  marker.ns = ns;
+  marker.id = id;
+  marker.type = type;
+  marker.action = Marker::ADD;
+  marker.pose.orientation.w = 1.0;
+  marker.color.r = colour.r;
+  marker.color.g = colour.g;
+  marker.color.b = colour.b;
+  marker.color.a = colour.a;
+  return marker;
+}
+
+geometry_msgs::Point point(double x, double y, double z) {
+  geometry_msgs::Point p;
+  p.x = x;
+  p.y = y;
+  p.z = z;
+  return p;
+}
+
+void set_scale(Marker& marker, double x, double y, double z) {
+  marker.scale.x = x;
+  marker.scale.y = y;
+  marker.scale.z = z;
+}
+
+}  // namespace
+
+visualization_msgs::MarkerArray bias_markers(const BiasEstimate& bias, const std::string& map_frame) {
+  constexpr int kSegments = 72;
+  constexpr double kHeight_m = 0.1;
+  const ros::Time time = to_ros(bias.stamp);
+  const Colour colour = bias.in_shadow ? Colour{1.0F, 0.55F, 0.0F, 0.9F} : Colour{0.2F, 0.8F, 0.3F, 0.9F};
+  const Eigen::Vector2d centre = bias.predicted_antenna_position;
+  Marker ring = make_marker("bias_ring", 0, Marker::LINE_STRIP, colour, time, map_frame);
+  ring.scale.x = 0.12;
+  for (int i = 0; i <= kSegments; ++i) {
+    const double angle = 2.0 * kPi * i / kSegments;
+    ring.points.push_back(point(centre.x() + bias.radius_m * std::cos(angle),
+                                centre.y() + bias.radius_m * std::sin(angle), kHeight_m));
+  }
+  Marker arrow = make_marker("bias", 0, Marker::ARROW, colour, time, map_frame);
+  set_scale(arrow, 0.15, 0.4, 0.4);
+  arrow.points = {point(centre.x(), centre.y(), kHeight_m),
+                  point(centre.x() + bias.bias.x(), centre.y() + bias.bias.y(), kHeight_m)};
+  visualization_msgs::MarkerArray markers;
+  markers.markers = {ring, arrow};
+  return markers;
+}
+
+visualization_msgs::MarkerArray target_markers(const std::vector<Eigen::Vector2d>& targets, std::size_t current,
+                                               const ros::Time& time, const std::string& map_frame) {
+  visualization_msgs::MarkerArray markers;
+  for (std::size_t i = 0; i < targets.size(); ++i) {
+    const Colour colour = i == current ? Colour{1.0F, 0.2F, 0.2F, 1.0F} : Colour{0.75F, 0.75F, 0.8F, 0.9F};
+    const int id = static_cast<int>(i);
+    Marker disc = make_marker("targets", id, Marker::CYLINDER, colour, time, map_frame);
+    disc.pose.position = point(targets[i].x(), targets[i].y(), 0.05);
+    set_scale(disc, 1.0, 1.0, 0.1);
+    Marker label = make_marker("target_numbers", id, Marker::TEXT_VIEW_FACING, {1.0F, 1.0F, 1.0F, 1.0F}, time,
+                               map_frame);
+    label.pose.position = point(1.12 * targets[i].x(), 1.12 * targets[i].y(), 0.6);
+    label.scale.z = 1.2;
+    label.text = std::to_string(i + 1);
+    markers.markers.push_back(disc);
+    markers.markers.push_back(label);
+  }
+  return markers;
+}
+
+visualization_msgs::MarkerArray field_markers(double shadow_border_m, double extent_m, const Pose2& truth,
+                                              double wheelbase_m, const ros::Time& time,
+                                              const std::string& map_frame) {
+  Marker shadow = make_marker("shadow", 0, Marker::CUBE, {0.35F, 0.3F, 0.5F, 0.45F}, time, map_frame);
+  shadow.pose.position = point(0.5 * (shadow_border_m - extent_m), 0.0, -0.06);
+  set_scale(shadow, shadow_border_m + extent_m, 2.0 * extent_m, 0.02);
+  Marker body = make_marker("truth", 0, Marker::CUBE, {0.95F, 0.95F, 0.95F, 1.0F}, time, map_frame);
+  body.pose = to_message(truth);
+  const Eigen::Vector2d centre = transform_point(truth, {0.5 * wheelbase_m, 0.0});  // the pose is the rear axle's
+  body.pose.position = point(centre.x(), centre.y(), 0.25);
+  set_scale(body, 1.4 * wheelbase_m, 0.7 * wheelbase_m, 0.5);
+  visualization_msgs::MarkerArray markers;
+  markers.markers = {shadow, body};
+  return markers;
+}
+
+}  // namespace urban_gnss

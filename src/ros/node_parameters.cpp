@@ -1,0 +1,51 @@
+#include "urban_gnss_localization/ros/node_parameters.hpp"
+
+#include <ros/ros.h>
+
+namespace urban_gnss {
+namespace {
+
+YAML::Node to_yaml(XmlRpc::XmlRpcValue& value) {
+  switch (value.getType()) {
+    case XmlRpc::XmlRpcValue::TypeBoolean: return YAML::Node(static_cast<bool>(value));
+    case XmlRpc::XmlRpcValue::TypeInt: return YAML::Node(static_cast<int>(value));
+    case XmlRpc::XmlRpcValue::TypeDouble: return YAML::Node(static_cast<double>(value));
+    case XmlRpc::XmlRpcValue::TypeString: return YAML::Node(static_cast<std::string>(value));
+    case XmlRpc::XmlRpcValue::TypeArray: {
+      YAML::Node list(YAML::NodeType::Sequence);
+      for (int i = 0; i < value.size(); ++i) list.push_back(to_yaml(value[i]));
+      return list;
+    }
+    case XmlRpc::XmlRpcValue::TypeStruct: {
+      YAML::Node map(YAML::NodeType::Map);
+      for (auto& entry : value) map[entry.first] = to_yaml(entry.second);
+      return map;
+    }
+    default: return YAML::Node();
+  }
+}
+
+}  // namespace
+
+YAML::Node private_parameters(const ros::NodeHandle& private_node) {
+  XmlRpc::XmlRpcValue value;
+  if (!private_node.getParam(private_node.getNamespace(), value)) return YAML::Node();
+  return to_yaml(value);
+}
+
+int run_node(int argc, char** argv, const std::string& name,
+             const std::function<std::shared_ptr<void>(ros::NodeHandle&, ros::NodeHandle&)>& make) {
+  ros::init(argc, argv, name);
+  ros::NodeHandle node;
+  ros::NodeHandle private_node("~");
+  try {
+    const std::shared_ptr<void> alive = make(node, private_node);
+    ros::spin();
+  } catch (const std::exception& error) {
+    ROS_FATAL_STREAM(error.what());
+    return 1;
+  }
+  return 0;
+}
+
+}  // namespace urban_gnss

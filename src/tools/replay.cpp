@@ -1,0 +1,377 @@
+// Runs a bag through the same core as the live nodes: offline, deterministic, as fast as the machine can.
+
+#include <rosbag/bag.h>
+#include <rosbag/view.h>
+#include <tf2_msgs/TFMessage.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <iomanip>
+#include <iostream>
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "urban_gnss_localization/common/progress.hpp"
+#include "urban_gnss_localization/evaluation/report_json.hpp"
+#include "urban_gnss_localization/evaluation/tum.hpp"
+#include "urban_gnss_localization/filters/particle_filter.hpp"
+#include "urban_gnss_localization/ros/conversions.hpp"
+#include "urban_gnss_localization/ros/localizer_node.hpp"
+#include "urban_gnss_localization/ros/topics.hpp"
+
+namespace fs = std::filesystem;
+using namespace urban_gnss;
+
+namespace {
+
+struct Options {
+  std::string input;
+  std::string localizer = "particle_filter";
+  std::vector<std::string> params;
+  std::vector<std::string> overrides;
+  std::string output;
+  std::string fix_topic = topics::kFix;
+  std::string odom_topic = topics::kOdometry;
+  std::string imu_topic;
+  std::string truth_topic = topics::kTruth;
+  std::vector<double> datum;
+  int seed = -1;
+  std::string json_file;
+  std::string tum_file;
+};
+
+/// All that is configurable: what the live localizer and the live bias node read.
+struct Parameters {
+  LocalizerNodeParameters node;
+  ParticleFilterParameters filter;
+  MotionParameters motion;
+  GpsBiasParameters bias;
+};
+
+/// Files in their order, later values over earlier ones. A file may hold the parameters flat, or by node as rosparam
+/// does (`particle_filter:`, `gps_bias:`).
+YAML::Node merge_parameters(const Options& options) {
+  YAML::Node merged(YAML::NodeType::Map);
+  const auto merge = [&merged](const YAML::Node& map) {
+    for (const auto& entry : map) merged[entry.first.as<std::string>()] = entry.second;
+  };
+  for (const std::string& file : options.params) {
+    YAML::Node map;
+    try {
+      map = YAML::LoadFile(file);
+    } catch (const YAML::Exception& error) {
+      throw std::runtime_error("--params " + file + ": " + error.what());
+    }
+    if (!map.IsMap() && !map.IsNull()) throw std::runtime_error("--params " + file + ": must be a map of names to values");
+    for (const char* section : {"gps_bias", "particle_filter"}) {
+      if (!map.IsMap() || !map[section].IsDefined()) continue;
+      merge(map[section]);
+      map.remove(section);
+    }
+    if (map.IsMap()) merge(map);
+  }
+  for (const std::string& text : options.overrides) {
+    const auto equal = text.find('=');
+    if (equal == std::string::npos) throw std::runtime_error("--set " + text + ": must be NAME=VALUE");
+    merged[text.substr(0, equal)] = YAML::Load(text.substr(equal + 1));
+  }
+  if (options.seed >= 0) merged["seed"] = options.seed;
+  if (!options.imu_topic.empty()) merged["use_imu_yaw_rate"] = true;
+  if (!options.datum.empty()) merged["datum"] = options.datum;
+  return merged;
+}
+
+Parameters read_parameters(const Options& options) {
+  Parameters parameters;
+  ParameterReader reader(merge_parameters(options));
+  for (const char* live_only : {"particle_cloud_rate", "estimate_timeout", "diagnostic_period"}) reader.ignore(live_only);
+  const auto faults = reader.read(parameters.node)
+                          .read(parameters.filter)
+                          .read(parameters.motion)
+                          .read(parameters.bias)
+                          .finish();
+  if (!faults.empty()) throw ParameterError("replay", faults);
+  return parameters;
+}
+
+std::string without_slash(const std::string& topic) { return topic.rfind('/', 0) == 0 ? topic.substr(1) : topic; }
+
+/// The messages of the bag in a fixed order: by the time they were recorded, then by what they are (as in `names`).
+std::vector<rosbag::MessageInstance> ordered_messages(const rosbag::Bag& bag, const std::vector<std::string>& names) {
+  rosbag::View view(bag, [&](const rosbag::ConnectionInfo* connection) {
+    return std::find(names.begin(), names.end(), without_slash(connection->topic)) != names.end();
+  });
+  const std::vector<rosbag::MessageInstance> as_read(view.begin(), view.end());
+  struct Key {
+    ros::Time time;
+    std::ptrdiff_t rank;
+    std::size_t index;
+  };
+  std::vector<Key> keys;
+  keys.reserve(as_read.size());
+  for (std::size_t i = 0; i < as_read.size(); ++i) {
+    const auto name = std::find(names.begin(), names.end(), without_slash(as_read[i].getTopic()));
+    keys.push_back({as_read[i].getTime(), name - names.begin(), i});
+  }
+  std::stable_sort(keys.begin(), keys.end(), [](const Key& a, const Key& b) {
+    return a.time != b.time ? a.time < b.time : a.rank < b.rank;
+  });
+  std::vector<rosbag::MessageInstance> messages;
+  messages.reserve(keys.size());
+  for (const Key& key : keys) messages.push_back(as_read[key.index]);
+  return messages;
+}
+
+template <class M>
+boost::shared_ptr<M> expect(const rosbag::MessageInstance& message) {
+  const auto typed = message.instantiate<M>();
+  if (!typed) {
+    throw std::runtime_error(message.getTopic() + ": is " + message.getDataType() + ", must be " +
+                             ros::message_traits::DataType<M>::value());
+  }
+  return typed;
+}
+
+/// The pipeline and the bias filter of one run, with what it writes.
+class Replay {
+ public:
+  Replay(const Options& options, const Parameters& parameters)
+      : parameters_(parameters),
+        pipeline_(parameters.node.localization, make_localizer(options.localizer, parameters)),
+        bias_tracker_(parameters.bias) {
+    if (!options.output.empty()) {
+      const fs::path path(options.output);
+      if (path.has_parent_path()) fs::create_directories(path.parent_path());
+      bag_.open(options.output, rosbag::bagmode::Write);
+    }
+  }
+
+  void add_odometry(const nav_msgs::Odometry& message) {
+    newest_ = to_stamp(message.header.stamp);
+    pipeline_.add_odometry(to_odometry_sample(message));
+    settle();
+  }
+  void add_fix(const sensor_msgs::NavSatFix& message) {
+    pipeline_.add_fix(to_raw_fix(message));
+    settle();
+  }
+  void add_imu(const sensor_msgs::Imu& message) {
+    if (const auto rate = to_yaw_rate(message)) pipeline_.add_imu_yaw_rate(to_stamp(message.header.stamp), *rate);
+  }
+  void set_datum(const sensor_msgs::NavSatFix& message) {
+    bag_datum_ = to_geodetic(message);
+    if (!pipeline_.frame()) pipeline_.set_datum(*bag_datum_);
+    settle();
+  }
+  void add_truth(const nav_msgs::Odometry& message) { truth_.push_back(to_timed_pose(message)); }
+
+  void close() {
+    if (bag_.isOpen()) bag_.close();
+  }
+
+  const Trajectory& estimate() const { return estimate_; }
+  const std::map<std::string, std::size_t>& decisions() const { return decisions_; }
+  const LocalizationPipeline& pipeline() const { return pipeline_; }
+
+  /// The truth in the frame of this run's datum.
+  std::optional<Trajectory> truth() const {
+    if (truth_.empty() || !pipeline_.frame()) return std::nullopt;
+    if (!bag_datum_) {
+      std::cerr << "replay: the bag has a truth but no gps/datum; the truth is taken to be in the frame of the datum\n";
+      return truth_;
+    }
+    const LocalFrame theirs(*bag_datum_);
+    Trajectory moved = truth_;
+    for (TimedPose& timed : moved) {
+      const Eigen::Vector3d point =
+          pipeline_.frame()->to_local(theirs.to_geodetic({timed.pose.x, timed.pose.y, 0.0}));
+      timed.pose.x = point.x();
+      timed.pose.y = point.y();
+    }
+    sort_by_stamp(moved);
+    return moved;
+  }
+
+ private:
+  static std::unique_ptr<Localizer> make_localizer(const std::string& name, const Parameters& parameters) {
+    if (name == "particle_filter") return std::make_unique<ParticleFilter>(parameters.filter, parameters.motion);
+    throw std::runtime_error("--localizer " + name + ": no such localizer; there is particle_filter");
+  }
+
+  /// Answers the pipeline's questions for the bias, as gps_bias_node does live, and writes what came of it.
+  void settle() {
+    while (const auto query = pipeline_.bias_query()) {
+      const BiasEstimate& bias =
+          bias_tracker_.process(query->fix, query->predicted_antenna_position, query->sanitation);
+      write(topics::kBias, bias.stamp, to_message(bias, parameters_.node.frames.map));
+      pipeline_.add_bias(bias);
+    }
+    for (const PipelineEvent& event : pipeline_.take_events()) {
+      if (event.text.rfind("reset", 0) == 0) bias_tracker_.reset();
+      std::cerr << "[" << std::fixed << std::setprecision(3) << to_seconds(newest_) << "] " << event.text << '\n';
+    }
+    for (const LocalizationOutput& output : pipeline_.take_outputs()) {
+      estimate_.push_back({output.stamp, output.estimate.pose, output.estimate.covariance});
+      write(topics::kEstimate, output.stamp, to_message(output, parameters_.node.frames));
+      tf2_msgs::TFMessage tf;
+      tf.transforms.push_back(
+          to_map_to_odom(output, parameters_.node.frames, parameters_.node.transform_time_offset));
+      write("tf", output.stamp, tf);
+    }
+    for (const FixVerdict& verdict : pipeline_.take_verdicts()) {
+      ++decisions_[to_string(verdict.decision)];
+      write("status", newest_, to_message(pipeline_.report(), pipeline_.localizer(), to_ros(newest_),
+                                          parameters_.node.frames.map));
+    }
+  }
+
+  template <class M>
+  void write(const std::string& topic, Stamp stamp, const M& message) {
+    if (bag_.isOpen()) bag_.write("/" + topic, std::max(to_ros(stamp), ros::TIME_MIN), message);
+  }
+
+  Parameters parameters_;
+  LocalizationPipeline pipeline_;
+  BiasTracker bias_tracker_;
+  rosbag::Bag bag_;
+  Stamp newest_{0};
+  std::optional<GeodeticPosition> bag_datum_;
+  Trajectory estimate_;
+  Trajectory truth_;
+  std::map<std::string, std::size_t> decisions_;
+};
+
+void write_file(const std::string& file, const std::function<void(std::ostream&)>& write) {
+  const fs::path path(file);
+  if (path.has_parent_path()) fs::create_directories(path.parent_path());
+  std::ofstream out(path);
+  write(out);
+  out.close();
+  if (!out) throw std::runtime_error(file + ": cannot be written");
+}
+
+void print_summary(const Replay& replay, const nlohmann::json& metrics, double wall_s, double bag_s) {
+  std::cout << replay.estimate().size() << " estimates in " << std::fixed << std::setprecision(2) << wall_s << " s ("
+            << std::setprecision(0) << bag_s / std::max(wall_s, 1e-3) << " times real time)\n";
+  std::cout << "fixes:";
+  for (const auto& [decision, count] : replay.decisions()) std::cout << "  " << decision << " " << count;
+  std::cout << '\n';
+  if (!metrics.contains("errors")) return;
+  const auto& position = metrics["errors"]["position_m"];
+  if (position["median"].is_null()) return;
+  std::cout << std::setprecision(2) << "position error, m: median " << position["median"].get<double>() << ", mean "
+            << position["mean"].get<double>() << ", 95 % " << position["p95"].get<double>() << ", max "
+            << position["max"].get<double>() << "; the truth was covered to "
+            << 100.0 * metrics["errors"]["coverage"].get<double>() << " %\n";
+}
+
+void run(const Options& options) {
+  const Parameters parameters = read_parameters(options);
+  if (!fs::exists(options.input)) throw std::runtime_error(options.input + ": no such bag");
+  rosbag::Bag bag(options.input, rosbag::bagmode::Read);
+
+  const std::string fix = without_slash(options.fix_topic);
+  const std::string odom = without_slash(options.odom_topic);
+  const std::string imu = without_slash(options.imu_topic);
+  const std::string truth = without_slash(options.truth_topic);
+  const auto messages = ordered_messages(bag, {topics::kDatum, imu, odom, fix, truth});
+  const auto count = [&](const std::string& name) {
+    return std::count_if(messages.begin(), messages.end(),
+                         [&](const auto& message) { return without_slash(message.getTopic()) == name; });
+  };
+  for (const auto& [option, name] : {std::pair("--fix-topic", fix), std::pair("--odom-topic", odom),
+                                     std::pair("--imu-topic", imu)}) {
+    if (!name.empty() && count(name) == 0) {
+      std::string present;
+      rosbag::View all(bag);
+      for (const rosbag::ConnectionInfo* connection : all.getConnections()) {
+        present += "\n  " + connection->topic + " (" + connection->datatype + ")";
+      }
+      throw std::runtime_error(options.input + " has no message on " + name + " (" + option + "); it has" + present);
+    }
+  }
+
+  Replay replay(options, parameters);
+  Progress progress(messages.size(), "messages");
+  const auto start = std::chrono::steady_clock::now();
+  std::size_t done = 0;
+  for (const rosbag::MessageInstance& message : messages) {
+    const std::string name = without_slash(message.getTopic());
+    if (name == odom) {
+      replay.add_odometry(*expect<nav_msgs::Odometry>(message));
+    } else if (name == fix) {
+      replay.add_fix(*expect<sensor_msgs::NavSatFix>(message));
+    } else if (name == imu) {
+      replay.add_imu(*expect<sensor_msgs::Imu>(message));
+    } else if (name == truth) {
+      replay.add_truth(*expect<nav_msgs::Odometry>(message));
+    } else {
+      replay.set_datum(*expect<sensor_msgs::NavSatFix>(message));
+    }
+    progress.report(++done);
+  }
+  progress.finish();
+  replay.close();
+  const double wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+
+  const LocalizationReport report = replay.pipeline().report();
+  nlohmann::json metrics = {{"bag", fs::path(options.input).filename().string()},
+                            {"localizer", options.localizer},
+                            {"mode", replay.pipeline().localizer().mode()},
+                            {"seed", parameters.filter.seed},
+                            {"estimates", replay.estimate().size()},
+                            {"decisions", replay.decisions()}};
+  metrics["final_state"] = to_string(report.state);
+  if (const auto& frame = replay.pipeline().frame()) {
+    metrics["datum"] = {frame->datum().latitude_deg, frame->datum().longitude_deg, frame->datum().altitude_m};
+  }
+  if (const auto reference = replay.truth()) {
+    metrics["errors"] = to_json(errors_at_truth(*reference, replay.estimate()).summary);
+  }
+  if (!options.json_file.empty()) {
+    write_file(options.json_file, [&](std::ostream& out) { out << metrics.dump(2) << '\n'; });
+  }
+  if (!options.tum_file.empty()) {
+    write_file(options.tum_file, [&](std::ostream& out) { write_tum(out, replay.estimate()); });
+  }
+  const double bag_s = messages.empty() ? 0.0 : (messages.back().getTime() - messages.front().getTime()).toSec();
+  print_summary(replay, metrics, wall_s, bag_s);
+  if (replay.estimate().empty()) {
+    throw std::runtime_error("no estimate: still waiting for " + replay.pipeline().waiting_for());
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Options options;
+  CLI::App app("Runs a bag through a localizer offline; the same input, parameters and seed give the same output.");
+  app.option_defaults()->always_capture_default();
+  app.add_option("bag", options.input, "the bag to read")->required();
+  app.add_option("--localizer", options.localizer, "particle_filter");
+  app.add_option("--params", options.params, "YAML with the nodes' parameters; repeatable, later files win");
+  app.add_option("--set", options.overrides, "one parameter, NAME=VALUE; repeatable");
+  app.add_option("--output", options.output, "bag to write: odometry/filtered, gps/bias, status, tf");
+  app.add_option("--fix-topic", options.fix_topic, "sensor_msgs/NavSatFix");
+  app.add_option("--odom-topic", options.odom_topic, "nav_msgs/Odometry");
+  app.add_option("--imu-topic", options.imu_topic, "sensor_msgs/Imu whose yaw rate is used instead of the odometry's");
+  app.add_option("--truth-topic", options.truth_topic, "nav_msgs/Odometry, for the errors only");
+  app.add_option("--datum", options.datum, "LAT,LON,ALT (deg, deg, m); default: the bag's gps/datum, or the first fixes")
+      ->delimiter(',')
+      ->expected(3);
+  app.add_option("--seed", options.seed, "seed of the random numbers; default: as in the parameters");
+  app.add_option("--json", options.json_file, "write decisions and errors here");
+  app.add_option("--tum", options.tum_file, "write the trajectory here (TUM format, ENU about the datum)");
+  CLI11_PARSE(app, argc, argv);
+  try {
+    run(options);
+  } catch (const std::exception& error) {
+    std::cerr << "replay: " << error.what() << '\n';
+    return 1;
+  }
+  return 0;
+}
