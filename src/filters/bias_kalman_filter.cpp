@@ -99,6 +99,7 @@ const BiasEstimate& BiasTracker::process(const LocalFix& fix, const Eigen::Vecto
   }
   last_predicted_ = fix.stamp;
   estimate_.stamp = fix.stamp;
+  estimate_.fix_position = fix.position;
   estimate_.predicted_antenna_position = predicted_antenna_position;
 
   FixVerdict verdict = sanitation;

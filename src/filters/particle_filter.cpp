@@ -69,6 +69,7 @@ ParticleFilter::ParticleFilter(const ParticleFilterParameters& parameters, const
 void ParticleFilter::initialize(const PoseEstimate& start) {
   engine_ = make_engine(static_cast<std::uint64_t>(parameters_.seed));
   particles_.draw_gaussian(start, engine_);
+  ring_.reset();
   estimate_ = start.pose;
   last_fix_position_ = start.pose.position();
   turn_since_fix_ = 0.0;

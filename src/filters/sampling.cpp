@@ -31,8 +31,10 @@ void sample_motion(ParticleSet& particles, const MotionStep& step, RandomEngine&
 RingSampler::RingSampler(std::size_t particle_count, double share)
     : count_(static_cast<std::size_t>(std::llround(share * static_cast<double>(particle_count)))),
       order_(particle_count) {
-  std::iota(order_.begin(), order_.end(), 0U);
+  reset();
 }
+
+void RingSampler::reset() { std::iota(order_.begin(), order_.end(), 0U); }
 
 void RingSampler::sample(ParticleSet& particles, const Pose2& predicted, double radius_m, double radius_sigma_m,
                          double weight_sigma_m, RandomEngine& engine) {

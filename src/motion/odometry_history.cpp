@@ -7,7 +7,7 @@ namespace urban_gnss {
 namespace {
 
 constexpr double kMaxSpeed_mps = 150.0;
-constexpr double kMaxYawRate_radps = 20.0;
+constexpr double kMaxYawRate_radps = 50.0;
 constexpr double kMaxCoordinate_m = 1e7;
 
 }  // namespace
@@ -18,7 +18,7 @@ std::string odometry_fault(const OdometrySample& sample) {
   }
   if (!is_finite(sample.pose)) return "pose is not finite";
   if (std::abs(sample.twist.speed_mps) > kMaxSpeed_mps) return "speed is beyond 150 m/s";
-  if (std::abs(sample.twist.yaw_rate_radps) > kMaxYawRate_radps) return "yaw rate is beyond 20 rad/s";
+  if (std::abs(sample.twist.yaw_rate_radps) > kMaxYawRate_radps) return "yaw rate is beyond 50 rad/s";
   if (sample.pose.position().norm() > kMaxCoordinate_m) return "pose is farther than 10 000 km from its origin";
   return {};
 }

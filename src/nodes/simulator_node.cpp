@@ -133,8 +133,6 @@ class SimulatorNode {
 
     const GeodeticPosition place = frame_.to_geodetic({fix.position.x(), fix.position.y(), 0.0});
     sensor_msgs::NavSatFix message = to_message(place, time, frames_.base_link);
-    message.status.status = sensor_msgs::NavSatStatus::STATUS_FIX;
-    message.status.service = sensor_msgs::NavSatStatus::SERVICE_GPS;
     // A receiver does not know that it is in the shadow: it claims the accuracy of direct reception everywhere.
     const double claimed = std::pow(std::max(field_.parameters().fix_direct_sigma, 1e-3), 2);
     message.position_covariance = {claimed, 0.0, 0.0, 0.0, claimed, 0.0, 0.0, 0.0, 4.0 * claimed};

@@ -74,7 +74,8 @@ void BiasPipeline::add_estimate(Stamp stamp, const Pose2& pose) {
 
 void BiasPipeline::add_fix(const RawFix& fix) {
   if (!frame_) return;
-  jumped(fix_stamps_, fix.stamp, "fixes");
+  // A receiver that does not know where it is may not know the time either.
+  if (is_usable_position(fix)) jumped(fix_stamps_, fix.stamp, "fixes");
   SanitizedFix sane = sanitize_fix(fix, *frame_, last_fix_stamp_, parameters_.fix);
   if (is_rejected(sane.verdict.decision)) {
     reject(sane.verdict);

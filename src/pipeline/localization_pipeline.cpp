@@ -13,6 +13,7 @@ namespace {
 constexpr double kHistory_s = 10.0;
 constexpr std::size_t kMaxWaitingFixes = 1000;
 constexpr double kLeastClusterMass = 0.5;
+constexpr double kFarSigmas = 3.0;
 /// Fixes closer together than this share their error: for the start they count as one.
 constexpr double kStartFixInterval_s = 1.0;
 
@@ -83,6 +84,7 @@ void LocalizationPipeline::reset(const std::string& why) {
   last_radius_m_ = 0.0;
   initialized_ = false;
   lost_ = false;
+  far_since_.reset();
   last_used_.reset();
   last_verdict_ = {};
   fixes_used_ = 0;
@@ -116,9 +118,12 @@ void LocalizationPipeline::use_datum(const GeodeticPosition& datum, const std::s
 
 void LocalizationPipeline::set_datum(const GeodeticPosition& datum) {
   LocalFrame checked(datum);  // throws before anything changes
-  const bool moves = frame_ && (initialized_ || heading_initializer_.timed_out());
   datum_was_set_ = true;
-  if (moves) {
+  if (frame_) {
+    const GeodeticPosition& old = frame_->datum();
+    const bool is_same = old.latitude_deg == datum.latitude_deg && old.longitude_deg == datum.longitude_deg &&
+                         old.altitude_m == datum.altitude_m;
+    if (is_same) return;
     frame_ = std::move(checked);
     reset("the datum was set to another place");
     return;
@@ -201,7 +206,8 @@ void LocalizationPipeline::add_odometry(const OdometrySample& sample) {
 }
 
 void LocalizationPipeline::add_fix(const RawFix& fix) {
-  jumped(fix_stamps_, fix.stamp, "fixes");
+  // A receiver that does not know where it is may not know the time either.
+  if (is_usable_position(fix)) jumped(fix_stamps_, fix.stamp, "fixes");
   if (!frame_) {
     before_datum_.push_back(fix);
     if (before_datum_.size() > kMaxWaitingFixes) before_datum_.pop_front();
@@ -268,10 +274,14 @@ bool LocalizationPipeline::process_next_fix() {
   }
   if (localizer_->wants_bias()) {
     while (!biases_.empty() && biases_.front().stamp < next.fix.stamp) biases_.pop_front();
-    if (!biases_.empty() && biases_.front().stamp == next.fix.stamp) {
-      const BiasEstimate bias = biases_.front();
+    // Searched for: a bias of before the clock was set back, published late, may stand in front for good.
+    const auto found = std::find_if(biases_.rbegin(), biases_.rend(),
+                                    [&](const BiasEstimate& bias) { return bias.stamp == next.fix.stamp; });
+    if (found != biases_.rend()) {
+      const BiasEstimate bias = *found;
       last_radius_m_ = bias.radius_m;
       pending_.pop_front();
+      if (restart_if_lost(next)) return true;
       if (is_rejected(bias.verdict.decision)) {
         decide(bias.verdict);
       } else {
@@ -284,7 +294,7 @@ bool LocalizationPipeline::process_next_fix() {
                                            ": the last radius is used");
   }
   pending_.pop_front();
-  correct_with(next, last_radius_m_);
+  if (!restart_if_lost(next)) correct_with(next, last_radius_m_);
   return true;
 }
 
@@ -311,33 +321,63 @@ void LocalizationPipeline::initialize_with(const PendingFix& pending) {
   verdict.reason = "used for the start";
   last_verdict_ = verdict;
   verdicts_.push_back(verdict);
+  remember_for_start(pending);
+  try_start(pending);
+}
+
+void LocalizationPipeline::remember_for_start(const PendingFix& pending) {
   if (last_start_fix_ && to_seconds(pending.fix.stamp - *last_start_fix_) < kStartFixInterval_s) return;
   last_start_fix_ = pending.fix.stamp;
-
   const Eigen::Vector2d offset = antenna_offset();
   const Pose2 antenna{offset.x(), offset.y(), 0.0};
   heading_initializer_.add(compose(*history_.pose_at(pending.fix.stamp), antenna), pending.fix);
+}
+
+bool LocalizationPipeline::try_start(const PendingFix& pending) {
+  if (last_start_fix_ != pending.fix.stamp) return false;  // nothing new since the last try
   std::optional<PoseEstimate> found = heading_initializer_.estimate();
   std::string how = "fixes and motion";
-  if (!found && heading_initializer_.timed_out()) {
+  if (!found && !initialized_ && heading_initializer_.timed_out()) {
     found = heading_initializer_.without_heading();
     how = "fixes, heading unknown";
   }
-  if (!found) return;
+  if (!found) return false;
   // The mean of the fixes is no better than their common error, which their scatter does not show.
   found->covariance.topLeftCorner<2, 2>() += pending.fix.covariance;
+  const Eigen::Vector2d offset = antenna_offset();
   const Pose2 since = *history_.motion_between(pending.fix.stamp, history_.latest());
-  found->pose = compose(compose(found->pose, inverse(antenna)), since);
+  found->pose = compose(compose(found->pose, inverse(Pose2{offset.x(), offset.y(), 0.0})), since);
   last_used_ = pending.fix.stamp;
   start(*found, how);
+  return true;
+}
+
+bool LocalizationPipeline::restart_if_lost(const PendingFix& pending) {
+  remember_for_start(pending);
+  const Pose2 since = *history_.motion_between(history_.latest(), pending.fix.stamp);
+  const Eigen::Vector2d predicted = transform_point(compose(localizer_->pose(), since), antenna_offset());
+  const double sigma = std::sqrt(pending.fix.covariance.trace());  // of the distance, as the receiver declares it
+  if ((pending.fix.position - predicted).norm() <= parameters_.max_bias_radius + kFarSigmas * sigma) {
+    far_since_.reset();
+    lost_ = false;
+    return false;
+  }
+  if (!far_since_) far_since_ = pending.fix.stamp;
+  if (to_seconds(pending.fix.stamp - *far_since_) < parameters_.lost_timeout) return false;
+  if (!lost_) {
+    event(PipelineEvent::Level::kWarn, "lost: every fix of the last " + seconds_text(parameters_.lost_timeout) +
+                                           " is farther than max_bias_radius");
+  }
+  lost_ = true;
+  return try_start(pending);
 }
 
 void LocalizationPipeline::start(const PoseEstimate& pose, const std::string& how) {
   localizer_->initialize(pose);
   initialized_ = true;
   lost_ = false;
+  far_since_.reset();
   start_.reset();
-  forget_start();
   last_radius_m_ = 0.0;
   std::ostringstream text;
   text.precision(4);
@@ -412,8 +452,12 @@ LocalizationReport LocalizationPipeline::report() const {
       std::sqrt(std::max(0.0, Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(position).eigenvalues()(1)));
   report.heading_converged = report.health.heading_sigma_rad < parameters_.heading_converged_sigma;
   const bool is_starved = !(report.fix_age_s <= parameters_.fix_timeout);
-  report.state = is_starved ? LocalizationState::kDeadReckoning : LocalizationState::kTracking;
-  if (is_starved) {
+  report.state = lost_          ? LocalizationState::kLost
+                 : is_starved ? LocalizationState::kDeadReckoning
+                              : LocalizationState::kTracking;
+  if (lost_) {
+    report.reason = "every fix is farther than max_bias_radius";
+  } else if (is_starved) {
     report.reason = "no fix was used for " + seconds_text(report.fix_age_s);
   } else if (report.odometry_age_s > parameters_.odometry_gap) {
     report.reason = "no odometry for " + seconds_text(report.odometry_age_s);

@@ -74,13 +74,15 @@ RawFix to_raw_fix(const sensor_msgs::NavSatFix& message) {
   return fix;
 }
 
-sensor_msgs::NavSatFix to_message(const GeodeticPosition& datum, const ros::Time& time, const std::string& frame) {
+sensor_msgs::NavSatFix to_message(const GeodeticPosition& place, const ros::Time& time, const std::string& frame) {
   sensor_msgs::NavSatFix message;
   message.header.stamp = time;
   message.header.frame_id = frame;
-  message.latitude = datum.latitude_deg;
-  message.longitude = datum.longitude_deg;
-  message.altitude = datum.altitude_m;
+  message.status.status = sensor_msgs::NavSatStatus::STATUS_FIX;
+  message.status.service = sensor_msgs::NavSatStatus::SERVICE_GPS;
+  message.latitude = place.latitude_deg;
+  message.longitude = place.longitude_deg;
+  message.altitude = place.altitude_m;
   return message;
 }
 

@@ -238,6 +238,7 @@ void LocalizerNode::look_up_antenna() {
 
 void LocalizerNode::every_second() {
   look_up_antenna();
+  if (antenna_known_) tf_listener_.reset();
   publish_status();
   diagnostics_.force_update();
 }

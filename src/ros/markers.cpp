@@ -1,5 +1,6 @@
 #include "urban_gnss_localization/ros/markers.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "urban_gnss_localization/ros/conversions.hpp"
@@ -49,21 +50,27 @@ visualization_msgs::MarkerArray bias_markers(const BiasEstimate& bias, const std
   constexpr int kSegments = 72;
   constexpr double kHeight_m = 0.1;
   const ros::Time time = to_ros(bias.stamp);
+  const double size = std::clamp(0.1 * bias.radius_m, 0.5, 4.0);  // m, so that a large ring is not drawn as a hair
   const Colour colour = bias.in_shadow ? Colour{1.0F, 0.55F, 0.0F, 0.9F} : Colour{0.2F, 0.8F, 0.3F, 0.9F};
   const Eigen::Vector2d centre = bias.predicted_antenna_position;
   Marker ring = make_marker("bias_ring", 0, Marker::LINE_STRIP, colour, time, map_frame);
-  ring.scale.x = 0.12;
+  ring.scale.x = 0.25 * size;
   for (int i = 0; i <= kSegments; ++i) {
     const double angle = 2.0 * kPi * i / kSegments;
     ring.points.push_back(point(centre.x() + bias.radius_m * std::cos(angle),
                                 centre.y() + bias.radius_m * std::sin(angle), kHeight_m));
   }
   Marker arrow = make_marker("bias", 0, Marker::ARROW, colour, time, map_frame);
-  set_scale(arrow, 0.15, 0.4, 0.4);
+  set_scale(arrow, 0.35 * size, 1.2 * size, 1.8 * size);
   arrow.points = {point(centre.x(), centre.y(), kHeight_m),
                   point(centre.x() + bias.bias.x(), centre.y() + bias.bias.y(), kHeight_m)};
+  const Colour fix_colour =
+      is_rejected(bias.verdict.decision) ? Colour{0.9F, 0.1F, 0.1F, 1.0F} : Colour{1.0F, 0.95F, 0.1F, 1.0F};
+  Marker fix = make_marker("fix", 0, Marker::SPHERE, fix_colour, time, map_frame);
+  fix.pose.position = point(bias.fix_position.x(), bias.fix_position.y(), kHeight_m);
+  set_scale(fix, size, size, size);
   visualization_msgs::MarkerArray markers;
-  markers.markers = {ring, arrow};
+  markers.markers = {ring, arrow, fix};
   return markers;
 }
 

@@ -1,6 +1,5 @@
 // Makes a bag out of a folder of recorded CSV files (gnss, odometry, satellites, velocity, IMU, truth and meta.json).
 
-#include <geometry_msgs/TransformStamped.h>
 #include <geometry_msgs/TwistWithCovarianceStamped.h>
 #include <nav_msgs/Odometry.h>
 #include <rosbag/bag.h>
@@ -30,6 +29,8 @@
 #include "urban_gnss_localization/geometry/local_frame.hpp"
 #include "urban_gnss_localization/geometry/pose2.hpp"
 #include "urban_gnss_localization/gnss/fix.hpp"
+#include "urban_gnss_localization/motion/motion_model.hpp"
+#include "urban_gnss_localization/ros/conversions.hpp"
 
 namespace {
 
@@ -47,13 +48,13 @@ struct OdometryNoise {
   double yaw_rate_rad_s{0.01};
 };
 
+/// As urban_gnss::to_ros, but what does not fit is an error of the file.
 ros::Time to_ros(Stamp stamp) {
-  constexpr std::int64_t kPerSecond = 1000000000;
-  if (stamp <= Stamp(0) || stamp.count() / kPerSecond > std::numeric_limits<std::uint32_t>::max()) {
+  const ros::Time time = urban_gnss::to_ros(stamp);
+  if (stamp <= Stamp(0) || urban_gnss::to_stamp(time) != stamp) {
     throw std::runtime_error("stamp " + urban_gnss::format_stamp(stamp) + " s does not fit a ROS time");
   }
-  return {static_cast<std::uint32_t>(stamp.count() / kPerSecond),
-          static_cast<std::uint32_t>(stamp.count() % kPerSecond)};
+  return time;
 }
 
 /// Messages of many topics on their way into one bag.
@@ -136,26 +137,6 @@ GeodeticPosition read_origin(const fs::path& path) {
   }
 }
 
-geometry_msgs::Quaternion yaw_quaternion(double yaw) {
-  geometry_msgs::Quaternion quaternion;
-  quaternion.z = std::sin(0.5 * yaw);
-  quaternion.w = std::cos(0.5 * yaw);
-  return quaternion;
-}
-
-sensor_msgs::NavSatFix nav_sat_fix(const std::string& frame, Stamp stamp, const GeodeticPosition& position) {
-  sensor_msgs::NavSatFix fix;
-  fix.header.stamp = to_ros(stamp);
-  fix.header.frame_id = frame;
-  fix.status.status = sensor_msgs::NavSatStatus::STATUS_FIX;
-  fix.status.service = sensor_msgs::NavSatStatus::SERVICE_GPS;
-  fix.latitude = position.latitude_deg;
-  fix.longitude = position.longitude_deg;
-  fix.altitude = position.altitude_m;
-  fix.position_covariance_type = sensor_msgs::NavSatFix::COVARIANCE_TYPE_UNKNOWN;
-  return fix;
-}
-
 /// Pose by dead reckoning from zero at the first row. A row's speed and yaw rate hold since the row before it.
 void add_odometry(const CsvTable& table, const OdometryNoise& noise, BagContents& contents) {
   constexpr double kMaxGapS = 1.0;  // what happened in a longer gap is not known: the pose stays where it was
@@ -174,37 +155,27 @@ void add_odometry(const CsvTable& table, const OdometryNoise& noise, BagContents
       }
       const double dt = urban_gnss::to_seconds(table.stamp(row) - table.stamp(row - 1));
       if (dt <= kMaxGapS) {
-        const double turn = yaw_rate * dt;
-        // The chord of the arc: sin(x) / x of half the turn, in its series where the quotient loses its digits.
-        const double half = 0.5 * turn;
-        const double chord = speed * dt * (std::abs(half) < 1e-4 ? 1.0 - half * half / 6.0 : std::sin(half) / half);
-        pose = urban_gnss::compose(pose, {chord * std::cos(half), chord * std::sin(half), turn});
+        pose = urban_gnss::move(pose, {speed, yaw_rate}, dt);
       }
     }
     nav_msgs::Odometry odometry;
     odometry.header.stamp = to_ros(table.stamp(row));
     odometry.header.frame_id = "odom";
     odometry.child_frame_id = "base_link";
-    odometry.pose.pose.position.x = pose.x;
-    odometry.pose.pose.position.y = pose.y;
-    odometry.pose.pose.orientation = yaw_quaternion(pose.yaw);
+    odometry.pose.pose = urban_gnss::to_message(pose);
     odometry.twist.twist.linear.x = speed;
     odometry.twist.twist.angular.z = yaw_rate;
     const double speed_sigma = std::hypot(noise.speed_mps, noise.speed_share * speed);
     odometry.twist.covariance[0] = speed_sigma * speed_sigma;
     odometry.twist.covariance[7] = noise.speed_mps * noise.speed_mps;
     odometry.twist.covariance[35] = noise.yaw_rate_rad_s * noise.yaw_rate_rad_s;
-    constexpr double kUnobserved = 1e6;
-    for (const std::size_t diagonal : {14, 21, 28}) odometry.twist.covariance[diagonal] = kUnobserved;
+    for (const std::size_t diagonal : {14, 21, 28}) {
+      odometry.twist.covariance[diagonal] = urban_gnss::kUnobservedVariance;
+    }
 
-    geometry_msgs::TransformStamped transform;
-    transform.header = odometry.header;
-    transform.child_frame_id = odometry.child_frame_id;
-    transform.transform.translation.x = pose.x;
-    transform.transform.translation.y = pose.y;
-    transform.transform.rotation = odometry.pose.pose.orientation;
     tf2_msgs::TFMessage transforms;
-    transforms.transforms.push_back(transform);
+    transforms.transforms.push_back(
+        urban_gnss::to_transform(pose, odometry.header.stamp, odometry.header.frame_id, odometry.child_frame_id));
 
     contents.add("/tf", table.stamp(row), transforms);
     contents.add("/odom", table.stamp(row), odometry);
@@ -231,7 +202,7 @@ void add_fixes(const CsvTable& table, const LocalFrame& frame, BagContents& cont
     const GeodeticPosition position{table.number(row, latitude), table.number(row, longitude),
                                     table.optional_number(row, altitude)};
     if (std::abs(position.latitude_deg) > 90.0) throw table.error(row, latitude, "is no latitude");
-    auto fix = nav_sat_fix("gps", table.stamp(row), position);
+    auto fix = urban_gnss::to_message(position, to_ros(table.stamp(row)), "gps");
     const double variances[] = {table.optional_number(row, xx), table.optional_number(row, xy),
                                 table.optional_number(row, yy), table.optional_number(row, zz)};
     if (std::all_of(std::begin(variances), std::end(variances), [](double v) { return std::isfinite(v); })) {
@@ -389,10 +360,9 @@ void add_truth(const CsvTable& table, BagContents& contents) {
     truth.header.stamp = to_ros(table.stamp(row));
     truth.header.frame_id = "map";
     truth.child_frame_id = "base_link";
-    truth.pose.pose.position.x = table.number(row, x);
-    truth.pose.pose.position.y = table.number(row, y);
+    truth.pose.pose =
+        urban_gnss::to_message(Pose2{table.number(row, x), table.number(row, y), table.number(row, yaw)});
     truth.pose.pose.position.z = or_zero(table.optional_number(row, z));
-    truth.pose.pose.orientation = yaw_quaternion(table.number(row, yaw));
     truth.twist.twist.linear.x = or_zero(table.optional_number(row, speed));
     contents.add("/ground_truth/odom", table.stamp(row), truth);
   }
@@ -421,7 +391,7 @@ void convert(const fs::path& folder, const std::string& gnss_file, const Odometr
 
   // The order of these calls is the order of messages with the same stamp: whatever a fix is compared with comes first.
   BagContents contents;
-  contents.add("/gps/datum", start, nav_sat_fix("map", start, origin));
+  contents.add("/gps/datum", start, urban_gnss::to_message(origin, to_ros(start), "map"));
   add_odometry(odometry, noise, contents);
   add_fixes(fixes, LocalFrame(origin), contents);
   for (const auto& [table, add] : optional_tables) add(table, contents);

@@ -1,18 +1,14 @@
 // Scores the estimates and the raw fixes in bags against ground truth: a table, JSON, error series and plots.
 
 #include <nav_msgs/Odometry.h>
-#include <ros/package.h>
 #include <rosbag/bag.h>
 #include <rosbag/view.h>
 #include <sensor_msgs/NavSatFix.h>
-#include <spawn.h>
-#include <sys/wait.h>
 
 #include <CLI/CLI.hpp>
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
 #include <cstdio>
 #include <exception>
@@ -34,8 +30,8 @@
 #include "urban_gnss_localization/evaluation/tum.hpp"
 #include "urban_gnss_localization/geometry/angles.hpp"
 #include "urban_gnss_localization/geometry/local_frame.hpp"
-
-extern char** environ;
+#include "urban_gnss_localization/ros/conversions.hpp"
+#include "urban_gnss_localization/ros/plotting.hpp"
 
 namespace {
 
@@ -78,7 +74,6 @@ std::string as_file_name(std::string name) {
   return name;
 }
 
-Stamp to_stamp(const ros::Time& time) { return std::chrono::seconds(time.sec) + std::chrono::nanoseconds(time.nsec); }
 
 /// Calls `use` with every message of the topic, written with or without a leading slash. False where there is none.
 template <class Message, class Use>
@@ -98,24 +93,6 @@ bool for_each_message(const rosbag::Bag& bag, const std::string& topic, Use use)
   return found;
 }
 
-TimedPose to_timed_pose(const nav_msgs::Odometry& odometry) {
-  const auto& q = odometry.pose.pose.orientation;
-  const Eigen::Vector3d forward = Eigen::Quaterniond(q.w, q.x, q.y, q.z).normalized() * Eigen::Vector3d::UnitX();
-  TimedPose pose;
-  pose.stamp = to_stamp(odometry.header.stamp);
-  pose.pose = {odometry.pose.pose.position.x, odometry.pose.pose.position.y, std::atan2(forward.y(), forward.x())};
-  constexpr int kOrder = 6;            // of the message's covariance
-  constexpr int kRows[3] = {0, 1, 5};  // x, y, rotation about z
-  Eigen::Matrix3d covariance;
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) {
-      covariance(i, j) = odometry.pose.covariance[static_cast<std::size_t>(kRows[i] * kOrder + kRows[j])];
-    }
-  }
-  if (!covariance.isZero(0.0)) pose.covariance = covariance;  // all zero is how messages say "not known"
-  return pose;
-}
-
 struct OdometryTrack {
   Trajectory trajectory;
   std::string frame;
@@ -127,7 +104,7 @@ std::optional<OdometryTrack> read_odometry(const rosbag::Bag& bag, const std::st
   std::size_t not_finite = 0;
   const bool found = for_each_message<nav_msgs::Odometry>(bag, topic, [&](const nav_msgs::Odometry& odometry) {
     track.frame = without_leading_slash(odometry.header.frame_id);
-    track.trajectory.push_back(to_timed_pose(odometry));
+    track.trajectory.push_back(urban_gnss::to_timed_pose(odometry));
     if (!urban_gnss::is_finite(track.trajectory.back().pose)) ++not_finite;
   });
   if (!found) return std::nullopt;
@@ -156,7 +133,7 @@ Trajectory read_fixes(const rosbag::Bag& bag, const std::string& topic, const Lo
     const Eigen::Vector3d local = frame.to_local({fix.latitude, fix.longitude, altitude});
     if (!local.allFinite()) return;
     TimedPose pose;
-    pose.stamp = to_stamp(fix.header.stamp);
+    pose.stamp = urban_gnss::to_stamp(fix.header.stamp);
     pose.pose = {local.x(), local.y(), kNan};
     if (fix.position_covariance_type != sensor_msgs::NavSatFix::COVARIANCE_TYPE_UNKNOWN) {
       pose.covariance.topLeftCorner<2, 2>() << fix.position_covariance[0], fix.position_covariance[1],
@@ -332,40 +309,6 @@ void write_metrics(const fs::path& path, const std::vector<Run>& runs) {
   close_file(file, path);
 }
 
-/// Beside this executable where it is installed, in the package's sources otherwise.
-fs::path find_plotter() {
-  constexpr const char* kName = "plot_evaluation.py";
-  std::error_code unreadable;
-  const fs::path executable = fs::read_symlink("/proc/self/exe", unreadable);
-  const fs::path package = ros::package::getPath("urban_gnss_localization");
-  std::vector<fs::path> candidates;
-  if (!unreadable) candidates.push_back(executable.parent_path() / kName);
-  if (!package.empty()) candidates.push_back(package / "scripts" / kName);
-  for (const fs::path& candidate : candidates) {
-    if (fs::exists(candidate)) return candidate;
-  }
-  throw std::runtime_error(std::string(kName) + ": not found beside this program nor in package "
-                           "urban_gnss_localization (source setup.bash, or use --no-plots)");
-}
-
-void run_plotter(const std::string& folder) {
-  // The distribution's own Python has the ROS and plotting modules; another one first on the path may not.
-  std::string python = fs::exists("/usr/bin/python3") ? "/usr/bin/python3" : "python3";
-  std::string script = find_plotter().string();
-  std::string argument = folder;
-  char* const arguments[] = {python.data(), script.data(), argument.data(), nullptr};
-  std::cout.flush();
-  pid_t child = 0;
-  if (posix_spawnp(&child, python.c_str(), nullptr, nullptr, arguments, environ) != 0) {
-    throw std::runtime_error(python + ": cannot be started");
-  }
-  int status = 0;
-  while (waitpid(child, &status, 0) < 0) {
-    if (errno != EINTR) throw std::runtime_error(script + ": was lost");
-  }
-  if (!WIFEXITED(status) || WEXITSTATUS(status) != 0) throw std::runtime_error(script + " " + folder + ": failed");
-}
-
 void evaluate(const Options& options) {
   std::set<std::string> stems;
   for (const std::string& bag : options.bags) {
@@ -387,7 +330,7 @@ void evaluate(const Options& options) {
   }
   print_table(std::cout, runs);
   write_metrics(fs::path(options.output) / "metrics.json", runs);
-  if (options.plots) run_plotter(options.output);
+  if (options.plots) urban_gnss::run_plotter("plot_evaluation.py", options.output);
 }
 
 }  // namespace

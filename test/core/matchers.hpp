@@ -66,13 +66,13 @@ inline PoseEstimate pose_with_sigma(const Pose2& pose, double position_sigma, do
 
 inline Eigen::Matrix2d isotropic(double sigma) { return sigma * sigma * Eigen::Matrix2d::Identity(); }
 
-/// Particles with the weights given, which need not be normalised.
+/// Gives particles their weights, which need not be normalised.
 inline void set_weights(ParticleSet& particles, const std::vector<double>& weights) {
   for (std::size_t i = 0; i < weights.size(); ++i) particles.log_weight[i] = std::log(weights[i]);
   particles.normalise();
 }
 
-/// A thousand poses or so with unequal weights.
+/// Poses all over a square, with unequal weights.
 inline ParticleSet random_particles(std::size_t count, RandomEngine& engine, double extent_m = 5.0) {
   ParticleSet particles(count);
   std::vector<double> weights;

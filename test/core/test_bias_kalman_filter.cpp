@@ -249,7 +249,7 @@ TEST(BiasTracker, EveryParameterHasAnEffectF36) {
     BiasTracker tracker(parameters);
     std::vector<double> values;
     for (int k = 0; k < 40; ++k) {
-      const double bias = k < 20 ? 0.8 * k : 70.0;
+      const double bias = k == 10 ? 14.0 : k < 20 ? 0.8 * k : 70.0;
       const BiasEstimate& e = tracker.process(fix_at(k, {bias, 2.0}), {1.0, 0.0});
       values.insert(values.end(), {e.radius_m, e.shadow_threshold, double(e.verdict.decision)});
     }

@@ -191,7 +191,8 @@ TEST(Clusters, AgreeWithABruteForceSearch) {
     for (std::size_t i = 0; i < n; ++i) mass[label[i]] += particles.weight[i];
     ParticleClusters clusters(n, 0.8);
     clusters.find(particles);
-    EXPECT_EQ(clusters.count(), static_cast<std::uint32_t>(std::count_if(mass.begin(), mass.end(), [](double m) { return m > 0.0; })));
+    const auto occupied = std::count_if(mass.begin(), mass.end(), [](double m) { return m > 0.0; });
+    EXPECT_EQ(clusters.count(), static_cast<std::uint32_t>(occupied));
     EXPECT_NEAR(clusters.heaviest_mass(), *std::max_element(mass.begin(), mass.end()), 1e-13);
   }
 }

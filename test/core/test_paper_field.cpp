@@ -68,7 +68,7 @@ TEST(PaperField, DirectionIsDrawnAnewAtEachEntryAndTheBiasGrowsContinuously) {
   PaperField field(parameters, no_noise);
   std::vector<double> directions;
   SimulatedFix last = field.fix();
-  for (int k = 0; k < 3000; ++k) {
+  for (int k = 0; k < 2500; ++k) {
     field.step(controller.steer(field.truth()));
     const SimulatedFix fix = field.fix();
     EXPECT_EQ(fix.in_shadow, field.truth().x < 0.0);

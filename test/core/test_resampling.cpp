@@ -34,7 +34,8 @@ TEST(Resampling, CopiesParticlesAndMakesWeightsEqualEq41) {
   }
 }
 
-// Chi-square of the counts over 2000 resamplings of 100 particles against M w. Independent draws: 99 degrees of freedom.
+// Chi-square of the counts over 2000 resamplings of 100 particles against M w: 99 degrees of freedom where the draws
+// are independent.
 TEST(Resampling, EveryParticleIsDrawnByItsWeightEq40) {
   constexpr int kRounds = 2000;
   constexpr double kCount = 100.0;

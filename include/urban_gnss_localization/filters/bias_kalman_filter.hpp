@@ -76,6 +76,7 @@ struct BiasEstimate {
   bool in_shadow{false};
   double shadow_statistic{0.0};  ///< squared Mahalanobis length of the bias
   double shadow_threshold{0.0};  ///< its chi-square quantile
+  Eigen::Vector2d fix_position{Eigen::Vector2d::Zero()};                ///< m, map frame
   Eigen::Vector2d predicted_antenna_position{Eigen::Vector2d::Zero()};  ///< m, what the fix was compared with
   FixVerdict verdict;
 };

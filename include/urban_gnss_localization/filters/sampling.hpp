@@ -24,6 +24,9 @@ class RingSampler {
   void sample(ParticleSet& particles, const Pose2& predicted, double radius_m, double radius_sigma_m,
               double weight_sigma_m, RandomEngine& engine);
 
+  /// The order of the draws as at the start, so that the same engine gives the same particles again.
+  void reset();
+
   std::size_t count() const { return count_; }
 
  private:

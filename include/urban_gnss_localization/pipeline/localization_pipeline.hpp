@@ -23,6 +23,10 @@ struct LocalizationParameters {
   std::vector<double> antenna_offset{0.0, 0.0};  ///< m, x and y of the antenna in the base frame
   bool use_imu_yaw_rate{false};            ///< the IMU's yaw rate in place of the odometry's, where there is one
   double odometry_gap{2.0};                ///< s without odometry after which the robot's place is unknown
+  /// m, beyond three declared standard deviations: a fix farther from the estimate cannot be explained by reflections
+  /// (Nishida et al., Japanese text: the distance does not vary by more than some tens of metres)
+  double max_bias_radius{50.0};
+  double lost_timeout{10.0};               ///< s of nothing but such fixes after which the estimate is what is wrong
   double fix_timeout{10.0};                ///< s without a fix that was used after which this is dead reckoning
   double bias_timeout{0.5};                ///< s that a fix waits for its gps/bias
   double time_jump{1.0};                   ///< s, a stamp older by more than this is a clock that was set back
@@ -40,6 +44,8 @@ struct LocalizationParameters {
     v("antenna_offset", antenna_offset);
     v("use_imu_yaw_rate", use_imu_yaw_rate);
     v("odometry_gap", odometry_gap, positive());
+    v("max_bias_radius", max_bias_radius, positive());
+    v("lost_timeout", lost_timeout, positive());
     v("fix_timeout", fix_timeout, positive());
     v("bias_timeout", bias_timeout, non_negative());
     v("time_jump", time_jump, positive());
@@ -154,6 +160,9 @@ class LocalizationPipeline {
   void process_fixes();
   bool process_next_fix();
   void initialize_with(const PendingFix& pending);
+  void remember_for_start(const PendingFix& pending);
+  bool try_start(const PendingFix& pending);
+  bool restart_if_lost(const PendingFix& pending);
   void start(const PoseEstimate& pose, const std::string& how);
   void forget_start();
   void correct_with(const PendingFix& pending, double radius_m);
@@ -188,6 +197,7 @@ class LocalizationPipeline {
 
   bool initialized_{false};
   bool lost_{false};
+  std::optional<Stamp> far_since_;  ///< since when every fix has been farther than max_bias_radius
   std::optional<Stamp> last_used_;
   FixVerdict last_verdict_;
   std::uint64_t fixes_used_{0};

@@ -43,7 +43,8 @@ Stamp to_stamp(const ros::Time& time);
 ros::Time to_ros(Stamp stamp);
 
 RawFix to_raw_fix(const sensor_msgs::NavSatFix& message);
-sensor_msgs::NavSatFix to_message(const GeodeticPosition& datum, const ros::Time& time, const std::string& frame);
+/// A fix without covariance.
+sensor_msgs::NavSatFix to_message(const GeodeticPosition& place, const ros::Time& time, const std::string& frame);
 GeodeticPosition to_geodetic(const sensor_msgs::NavSatFix& message);
 
 OdometrySample to_odometry_sample(const nav_msgs::Odometry& message);

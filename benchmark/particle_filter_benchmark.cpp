@@ -1,0 +1,162 @@
+// The cost of one step of the paper's filter and of its parts. Read the paper mode's step against the interval of the
+// odometry (10 ms in the paper's field).
+//
+//   particle_filter_benchmark --benchmark_min_time=0.5
+
+#include <benchmark/benchmark.h>
+
+#include "urban_gnss_localization/filters/bias_kalman_filter.hpp"
+#include "urban_gnss_localization/filters/particle_filter.hpp"
+
+namespace urban_gnss {
+namespace {
+
+constexpr Twist2 kTwist{10.0, 0.6};
+constexpr double kStep_s = 0.01;
+
+MotionParameters paper_motion(MotionModel model = MotionModel::kBicycle) {
+  MotionParameters motion;
+  motion.motion_model = model;
+  motion.odom_alpha1 = motion.odom_alpha3 = motion.odom_alpha5 = 3.0;
+  motion.odom_alpha2 = motion.odom_alpha4 = motion.odom_alpha6 = 0.3;
+  motion.odom_noise_scale = 1e-6;
+  motion.odom_noise_interval = kStep_s;
+  return motion;
+}
+
+/// A cloud of 0.3 m about the origin whose weights differ.
+ParticleSet cloud(std::size_t count) {
+  RandomEngine engine = make_engine(1);
+  PoseEstimate start;
+  start.covariance = Eigen::Vector3d(0.09, 0.09, 0.0025).asDiagonal();
+  ParticleSet particles(count);
+  particles.draw_gaussian(start, engine);
+  for (double& lw : particles.log_weight) lw = 2.0 * draw_normal(engine);
+  particles.normalise();
+  return particles;
+}
+
+void count_particles(benchmark::State& state) { state.SetItemsProcessed(state.iterations() * state.range(0)); }
+
+void BM_PaperStep(benchmark::State& state) {
+  ParticleFilterParameters parameters;
+  parameters.particle_count = static_cast<int>(state.range(0));
+  parameters.direct_sigma = 0.05;
+  parameters.shadow_sigma = 0.316;
+  parameters.use_fix_covariance = false;
+  parameters.cluster_cell = 0.5;
+  ParticleFilter filter(parameters, paper_motion());
+  filter.initialize({});
+  Pose2 truth;
+  FixMeasurement fix;
+  fix.covariance = 0.0025 * Eigen::Matrix2d::Identity();
+  fix.bias_radius_m = 2.0;
+  for (auto _ : state) {
+    truth = move(truth, kTwist, kStep_s);
+    filter.move(kTwist, kStep_s);
+    fix.position = truth.position() + Eigen::Vector2d(2.0, 0.0);
+    fix.time_s += kStep_s;
+    benchmark::DoNotOptimize(filter.correct(fix));
+  }
+  count_particles(state);
+}
+BENCHMARK(BM_PaperStep)->Arg(1000)->Arg(10000)->Unit(benchmark::kMicrosecond);
+
+void BM_SampleMotion(benchmark::State& state) {
+  ParticleSet particles = cloud(static_cast<std::size_t>(state.range(0)));
+  const MotionStep step = make_motion_step(kTwist, kStep_s, paper_motion(static_cast<MotionModel>(state.range(1))));
+  RandomEngine engine = make_engine(2);
+  for (auto _ : state) sample_motion(particles, step, engine);
+  state.SetLabel(enum_name(step.model));
+  count_particles(state);
+}
+BENCHMARK(BM_SampleMotion)
+    ->ArgsProduct({{1000, 10000}, {int(MotionModel::kBicycle), int(MotionModel::kVelocity)}})
+    ->Unit(benchmark::kMicrosecond);
+
+/// The plain reference that sample_motion is compared with.
+void BM_MoveNoisilyLoop(benchmark::State& state) {
+  ParticleSet particles = cloud(static_cast<std::size_t>(state.range(0)));
+  const MotionStep step = make_motion_step(kTwist, kStep_s, paper_motion(static_cast<MotionModel>(state.range(1))));
+  RandomEngine engine = make_engine(2);
+  for (auto _ : state) {
+    for (std::size_t i = 0; i < particles.size(); ++i) {
+      const Pose2 moved = move_noisily(particles.pose(i), step, draw_motion_noise(engine));
+      particles.x[i] = moved.x;
+      particles.y[i] = moved.y;
+      particles.yaw[i] = moved.yaw;
+    }
+  }
+  state.SetLabel(enum_name(step.model));
+  count_particles(state);
+}
+BENCHMARK(BM_MoveNoisilyLoop)
+    ->ArgsProduct({{1000, 10000}, {int(MotionModel::kBicycle), int(MotionModel::kVelocity)}})
+    ->Unit(benchmark::kMicrosecond);
+
+void BM_Weigh(benchmark::State& state) {
+  const ParticleSet original = cloud(static_cast<std::size_t>(state.range(0)));
+  ParticleSet particles = original;
+  FixLikelihood fix;
+  fix.form = static_cast<LikelihoodForm>(state.range(1));
+  fix.with_heading = fix.form != LikelihoodForm::kProduct;
+  fix.fix = {2.0, 0.0};
+  fix.radius = 2.0;
+  fix.direct_covariance *= 0.0025;
+  fix.shadow_sigma = 0.316;
+  for (auto _ : state) {
+    particles.log_weight = original.log_weight;
+    weigh(particles, fix);
+    benchmark::DoNotOptimize(particles.log_weight.data());
+  }
+  state.SetLabel(enum_name(fix.form));
+  count_particles(state);
+}
+BENCHMARK(BM_Weigh)
+    ->ArgsProduct({{1000, 10000},
+                   {int(LikelihoodForm::kPrinted), int(LikelihoodForm::kSum), int(LikelihoodForm::kProduct)}})
+    ->Unit(benchmark::kMicrosecond);
+
+void BM_Clusters(benchmark::State& state) {
+  const ParticleSet particles = cloud(static_cast<std::size_t>(state.range(0)));
+  ParticleClusters clusters(particles.size(), 0.1);
+  for (auto _ : state) {
+    clusters.find(particles);
+    benchmark::DoNotOptimize(clusters.heaviest_mean(particles));
+  }
+  count_particles(state);
+}
+BENCHMARK(BM_Clusters)->Arg(1000)->Arg(10000)->Unit(benchmark::kMicrosecond);
+
+void BM_Resampling(benchmark::State& state) {
+  const ParticleSet original = cloud(static_cast<std::size_t>(state.range(0)));
+  ParticleSet particles = original;
+  const auto scheme = static_cast<ResamplingScheme>(state.range(1));
+  Resampler resampler(particles.size(), scheme);
+  RandomEngine engine = make_engine(3);
+  for (auto _ : state) {
+    particles.weight = original.weight;
+    resampler.resample(particles, engine);
+    benchmark::DoNotOptimize(particles.x.data());
+  }
+  state.SetLabel(enum_name(scheme));
+  count_particles(state);
+}
+BENCHMARK(BM_Resampling)
+    ->ArgsProduct({{1000, 10000}, {int(ResamplingScheme::kMultinomial), int(ResamplingScheme::kSystematic)}})
+    ->Unit(benchmark::kMicrosecond);
+
+void BM_BiasKalmanStep(benchmark::State& state) {
+  BiasKalmanFilter filter;
+  const Eigen::Matrix2d noise = 0.1 * Eigen::Matrix2d::Identity();
+  const Eigen::Vector2d measurement(1.0, 2.0);
+  for (auto _ : state) {
+    filter.predict(kStep_s, 100.0);
+    filter.correct(filter.innovation(measurement, noise), noise);
+    benchmark::DoNotOptimize(filter.state.data());
+  }
+}
+BENCHMARK(BM_BiasKalmanStep);
+
+}  // namespace
+}  // namespace urban_gnss

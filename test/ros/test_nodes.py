@@ -1,0 +1,73 @@
+#!/usr/bin/env python3
+"""Each node by itself: bad parameters stop it with every fault listed; an interrupt ends it cleanly; it says what it
+waits for."""
+import os
+import signal
+import subprocess
+import unittest
+
+import rospy
+import rostest
+
+NODES = {
+    "particle_filter_node": (["_ring_share:=2.0", "_particle_count:=0", "_modus:=paper", "_mode:=papers"],
+                             ["ring_share = 2", "particle_count = 0", "did you mean mode?", "literal, paper, conventional"]),
+    "gps_bias_node": (["_shadow_sigma:=-1.0", "_bias_input:=residuals", "_gate:=0.5"],
+                      ["shadow_sigma = -1", "residual, position", "gate: no such parameter"]),
+    "simulator_node": (["_target_count:=1", "_interval:=0.0", "_datum:=[95.0, 0.0, 0.0]"],
+                       ["target_count = 1", "interval = 0", "datum"]),
+    "waypoint_controller_node": (["_speed:=fast", "_targets:=[1.0, 2.0, 3.0]"],
+                                 ["speed = fast: must be a number", "targets"]),
+}
+
+
+def command(node, *arguments):
+    return ["rosrun", "urban_gnss_localization", node, "__name:=tested_" + node, *arguments]
+
+
+class NodesTest(unittest.TestCase):
+    def test_bad_parameters_stop_the_node_with_all_faults(self):
+        for node, (parameters, faults) in NODES.items():
+            with self.subTest(node=node):
+                done = subprocess.run(command(node, *parameters), stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+                                      universal_newlines=True, timeout=30)
+                self.assertEqual(done.returncode, 1, done.stdout)
+                for fault in faults:
+                    self.assertIn(fault, done.stdout)
+                rospy.delete_param("tested_" + node)
+
+    def test_interrupt_ends_the_node_cleanly(self):
+        for node in NODES:
+            with self.subTest(node=node):
+                process = subprocess.Popen(command(node, "_publish_clock:=false") if node == "simulator_node"
+                                           else command(node), start_new_session=True, stdout=subprocess.PIPE,
+                                           stderr=subprocess.STDOUT, universal_newlines=True)
+                self.addCleanup(process.kill)
+                deadline = rospy.Time.now() + rospy.Duration(20.0)
+                while "/tested_" + node not in self.node_names():
+                    self.assertLess(rospy.Time.now(), deadline, node + " did not come up")
+                os.killpg(process.pid, signal.SIGINT)
+                output, _ = process.communicate(timeout=15)
+                self.assertEqual(process.returncode, 0, output)
+                for word in ("Segmentation", "terminate called", "FATAL"):
+                    self.assertNotIn(word, output)
+
+    @staticmethod
+    def node_names():
+        publishers, subscribers, _ = rospy.get_master().getSystemState()[2]
+        return {name for _, names in publishers + subscribers for name in names}
+
+    def test_says_what_it_waits_for(self):
+        """F20: within some seconds, without any input."""
+        process = subprocess.Popen(command("particle_filter_node"), start_new_session=True, stdout=subprocess.PIPE,
+                                   stderr=subprocess.STDOUT, universal_newlines=True)
+        self.addCleanup(os.killpg, process.pid, signal.SIGKILL)
+        for line in process.stdout:
+            if "waiting for odometry" in line:
+                return
+        self.fail("the node ended without saying what it waits for")
+
+
+if __name__ == "__main__":
+    rospy.init_node("test_nodes")
+    rostest.rosrun("urban_gnss_localization", "test_nodes", NodesTest)
