@@ -3,11 +3,15 @@
 #
 #   screenshot_rviz.sh FILE.png TOPIC CONDITION LAUNCH_FILE [ARG:=VALUE]...
 #
-# The picture is taken as soon as a message m on TOPIC meets CONDITION (Python, as in rostopic echo --filter). A source of
-# ROS's and the workspace's setup.bash must have been done. Needs xvfb and imagemagick. The pictures in docs/:
+# The picture is taken as soon as a message m on TOPIC meets CONDITION (Python, as in rostopic echo --filter). The
+# workspace's setup.bash must have been sourced. Needs xvfb and imagemagick. The pictures in docs/:
 #
 #   screenshot_rviz.sh docs/rviz_demo.png /ground_truth/odom \
-#     'm.header.stamp.to_sec() > 8 and m.pose.pose.position.x < -13' demo.launch
+#     'm.header.stamp.to_sec() > 8 and m.pose.pose.position.x < -13' demo.launch real_time_factor:=0.2
+#   screenshot_rviz.sh docs/rviz_replay.png /odometry/filtered 'm.header.stamp.to_sec() > 95806' \
+#     replay.launch rate:=6 bag:=/path/to/hk_tst_20210517_ublox.bag
+#
+# Without a graphics card rviz draws a few frames a second: a slow simulation or bag keeps its displays in step.
 set -eo pipefail
 
 if [ $# -lt 4 ]; then
@@ -33,5 +37,6 @@ until rosnode list 2>/dev/null | grep -q '^/rviz'; do
 done
 timeout "${SCREENSHOT_TIMEOUT:-300}" rostopic echo -n 1 --filter "$condition" "$topic" > /dev/null ||
   { echo "no message on $topic with: $condition" >&2; exit 1; }
+rosnode ping -c 1 /rviz > /dev/null || { echo "rviz has died" >&2; exit 1; }
 import -window root -strip -define png:compression-level=9 "$file"
 echo "$file: $(stat -c %s "$file") bytes"

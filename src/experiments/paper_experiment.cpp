@@ -4,6 +4,8 @@
 #include <cmath>
 #include <memory>
 
+#include "urban_gnss_localization/pipeline/bias_pipeline.hpp"
+
 namespace urban_gnss {
 namespace {
 
@@ -85,6 +87,28 @@ void make_oracle(PaperExperimentConditions& c) {
 }
 
 }  // namespace
+
+PaperExperimentConditions read_paper_conditions(const PaperFiles& files) {
+  PaperExperimentConditions conditions;
+  std::vector<std::string> faults;
+  const auto read = [&](const std::string& name, const auto& ignored, auto&... structs) {
+    const auto file = files.find(name);
+    ParameterReader reader(file == files.end() ? YAML::Node() : file->second);
+    for (const char* other : ignored) reader.ignore(other);
+    (reader.read(structs), ...);
+    for (const std::string& fault : reader.finish()) faults.push_back(name + "." + fault);
+  };
+  const std::vector<const char*> nothing;
+  read("simulator", std::vector<const char*>{"field"}, conditions.field, conditions.field_motion);
+  read("particle_filter", nothing, conditions.filter, conditions.filter_motion);
+  BiasPipelineParameters bias_node;  // the file is the node's, which has more than the filter
+  read("gps_bias", nothing, bias_node);
+  conditions.bias = bias_node.bias;
+  read("waypoint_controller", nothing, conditions.controller);
+  if (!faults.empty()) throw ParameterError("the paper's field", faults);
+  conditions.controller.targets = conditions.field.targets();
+  return conditions;
+}
 
 const std::vector<PaperMethod>& paper_methods() {
   using Kind = PaperMethod::Kind;

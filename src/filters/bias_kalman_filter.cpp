@@ -120,6 +120,7 @@ const BiasEstimate& BiasTracker::process(const LocalFix& fix, const Eigen::Vecto
     filter_.state(0) = measurement.x();
     filter_.state(2) = measurement.y();
     innovation = filter_.innovation(measurement, noise);
+    verdict.nis = innovation.nis();
     verdict.reason = "bias filter started anew after " + std::to_string(parameters_.gate_timeout) + " s of rejections";
   }
   filter_.correct(innovation, noise);

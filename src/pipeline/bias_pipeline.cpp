@@ -57,6 +57,11 @@ void BiasPipeline::add_odometry(const OdometrySample& sample) {
   if (!odometry_fault(sample).empty()) return;
   jumped(odometry_stamps_, sample.stamp, "odometry");
   if (odometry_stamps_.last() != sample.stamp || (!history_.empty() && sample.stamp <= history_.latest())) return;
+  if (!history_.empty() && to_seconds(sample.stamp - history_.latest()) > parameters_.odometry_gap) {
+    // The localizer starts anew after such a gap, and what the fix is compared with is another estimate.
+    history_.clear();
+    tracker_.reset();
+  }
   history_.add(sample.stamp, sample.twist);
   while (process_next_fix()) {
   }

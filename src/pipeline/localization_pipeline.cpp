@@ -14,6 +14,8 @@ constexpr double kHistory_s = 10.0;
 constexpr std::size_t kMaxWaitingFixes = 1000;
 constexpr double kLeastClusterMass = 0.5;
 constexpr double kFarSigmas = 3.0;
+/// A fix that is farther ahead of the odometry than this has a wrong stamp.
+constexpr double kMaxAhead_s = 10.0;
 /// Fixes closer together than this share their error: for the start they count as one.
 constexpr double kStartFixInterval_s = 1.0;
 
@@ -72,6 +74,7 @@ void LocalizationPipeline::reset(const std::string& why) {
   datum_initializer_.reset();
   forget_start();
   history_.clear();
+  ++epoch_;
   odometry_stamps_.reset();
   fix_stamps_.reset();
   imu_stamps_.reset();
@@ -144,6 +147,7 @@ bool LocalizationPipeline::jumped(StampMonitor& monitor, Stamp stamp, const char
   if (monitor.observe(stamp) != StampMonitor::Order::kJumpedBack) return false;
   if (!parameters_.reset_on_time_jump) return false;
   reset(std::string("the clock of the ") + stream + " jumped back by " + seconds_text(to_seconds(*last - stamp)));
+  last_output_.reset();
   monitor.observe(stamp);
   return true;
 }
@@ -189,6 +193,7 @@ void LocalizationPipeline::add_odometry(const OdometrySample& sample) {
     event(PipelineEvent::Level::kWarn, "no odometry for " + seconds_text(elapsed_s) +
                                            (initialized_ ? ": place unknown, starting anew from the fixes" : ""));
     history_.clear();
+    ++epoch_;
     forget_start();
     lost_ = lost_ || initialized_;
     initialized_ = false;
@@ -202,10 +207,20 @@ void LocalizationPipeline::add_odometry(const OdometrySample& sample) {
   }
   if (!initialized_ && start_ && frame_) start(*start_, "the given pose");
   process_fixes();
-  if (initialized_) outputs_.push_back({sample.stamp, localizer_->estimate(), sample.pose, twist});
+  if (!initialized_ || (last_output_ && sample.stamp <= *last_output_)) return;
+  last_output_ = sample.stamp;
+  outputs_.push_back({sample.stamp, localizer_->estimate(), sample.pose, twist});
 }
 
 void LocalizationPipeline::add_fix(const RawFix& fix) {
+  if (last_odometry_ && to_seconds(fix.stamp - last_odometry_->stamp) > kMaxAhead_s) {
+    FixVerdict verdict;
+    verdict.stamp = fix.stamp;
+    verdict.decision = FixDecision::kRejectedStale;
+    verdict.reason = "more than " + seconds_text(kMaxAhead_s) + " ahead of the odometry";
+    decide(std::move(verdict));
+    return;
+  }
   // A receiver that does not know where it is may not know the time either.
   if (is_usable_position(fix)) jumped(fix_stamps_, fix.stamp, "fixes");
   if (!frame_) {
@@ -316,11 +331,7 @@ void LocalizationPipeline::correct_with(const PendingFix& pending, double radius
 }
 
 void LocalizationPipeline::initialize_with(const PendingFix& pending) {
-  FixVerdict verdict = pending.sanitation;
-  verdict.decision = FixDecision::kNotExamined;
-  verdict.reason = "used for the start";
-  last_verdict_ = verdict;
-  verdicts_.push_back(verdict);
+  decide_unexamined(pending, "used for the start");
   remember_for_start(pending);
   try_start(pending);
 }
@@ -369,7 +380,9 @@ bool LocalizationPipeline::restart_if_lost(const PendingFix& pending) {
                                            " is farther than max_bias_radius");
   }
   lost_ = true;
-  return try_start(pending);
+  if (!try_start(pending)) return false;
+  decide_unexamined(pending, "used for a new start");
+  return true;
 }
 
 void LocalizationPipeline::start(const PoseEstimate& pose, const std::string& how) {
@@ -389,6 +402,14 @@ void LocalizationPipeline::start(const PoseEstimate& pose, const std::string& ho
 void LocalizationPipeline::forget_start() {
   heading_initializer_.reset();
   last_start_fix_.reset();
+}
+
+void LocalizationPipeline::decide_unexamined(const PendingFix& pending, const char* reason) {
+  FixVerdict verdict = pending.sanitation;
+  verdict.decision = FixDecision::kNotExamined;
+  verdict.reason = reason;
+  last_verdict_ = verdict;
+  verdicts_.push_back(std::move(verdict));
 }
 
 void LocalizationPipeline::decide(FixVerdict verdict) {
@@ -458,7 +479,7 @@ LocalizationReport LocalizationPipeline::report() const {
   if (lost_) {
     report.reason = "every fix is farther than max_bias_radius";
   } else if (is_starved) {
-    report.reason = "no fix was used for " + seconds_text(report.fix_age_s);
+    report.reason = last_used_ ? "no fix was used for " + seconds_text(report.fix_age_s) : "no fix was used yet";
   } else if (report.odometry_age_s > parameters_.odometry_gap) {
     report.reason = "no odometry for " + seconds_text(report.odometry_age_s);
   } else if (!report.heading_converged) {

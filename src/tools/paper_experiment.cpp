@@ -68,47 +68,24 @@ PaperExperimentConditions load_conditions(const Options& options) {
   const fs::path directory =
       options.config.empty() ? fs::path(ros::package::getPath("urban_gnss_localization")) / "config" / "paper_field"
                              : fs::path(options.config);
-  YAML::Node simulator = load_yaml(directory / "simulator.yaml");
-  YAML::Node filter = load_yaml(directory / "particle_filter.yaml");
-  YAML::Node bias = load_yaml(directory / "gps_bias.yaml");
-  YAML::Node controller = load_yaml(directory / "waypoint_controller.yaml");
+  PaperFiles files;
+  for (const char* name : kPaperFileNames) files[name] = load_yaml(directory / (std::string(name) + ".yaml"));
   for (const std::string& text : options.overrides) {
     const auto dot = text.find('.');
     const auto equal = text.find('=');
     if (dot == std::string::npos || equal == std::string::npos || dot > equal) {
       throw std::runtime_error("--set " + text + ": must be FILE.NAME=VALUE, e.g. particle_filter.ring_share=0.01");
     }
-    const std::string file = text.substr(0, dot);
-    YAML::Node* target = file == "simulator"             ? &simulator
-                         : file == "particle_filter"     ? &filter
-                         : file == "gps_bias"            ? &bias
-                         : file == "waypoint_controller" ? &controller
-                                                         : nullptr;
-    if (target == nullptr) throw std::runtime_error("--set " + text + ": no such file as " + file);
-    (*target)[text.substr(dot + 1, equal - dot - 1)] = YAML::Load(text.substr(equal + 1));
+    const auto file = files.find(text.substr(0, dot));
+    if (file == files.end()) throw std::runtime_error("--set " + text + ": no such file as " + text.substr(0, dot));
+    file->second[text.substr(dot + 1, equal - dot - 1)] = YAML::Load(text.substr(equal + 1));
   }
-  if (!options.bias_direction.empty()) simulator["bias_direction"] = options.bias_direction;
+  if (!options.bias_direction.empty()) files["simulator"]["bias_direction"] = options.bias_direction;
   if (options.noise_scale >= 0.0) {
-    simulator["odom_noise_scale"] = options.noise_scale;
-    filter["odom_noise_scale"] = options.noise_scale;
+    files["simulator"]["odom_noise_scale"] = options.noise_scale;
+    files["particle_filter"]["odom_noise_scale"] = options.noise_scale;
   }
-
-  PaperExperimentConditions conditions;
-  std::vector<std::string> faults;
-  const auto finish = [&](const ParameterReader& reader, const char* name) {
-    for (const std::string& fault : reader.finish()) faults.push_back(std::string(name) + "." + fault);
-  };
-  ParameterReader simulator_reader(simulator);
-  simulator_reader.ignore("field");
-  finish(simulator_reader.read(conditions.field).read(conditions.field_motion), "simulator");
-  ParameterReader filter_reader(filter);
-  finish(filter_reader.read(conditions.filter).read(conditions.filter_motion), "particle_filter");
-  ParameterReader bias_reader(bias);
-  finish(bias_reader.read(conditions.bias), "gps_bias");
-  ParameterReader controller_reader(controller);
-  finish(controller_reader.read(conditions.controller), "waypoint_controller");
-  if (!faults.empty()) throw ParameterError(directory.string(), faults);
-  conditions.controller.targets = conditions.field.targets();
+  PaperExperimentConditions conditions = read_paper_conditions(files);
   conditions.laps = options.laps;
   conditions.closed_loop = !options.open_loop;
   return conditions;

@@ -204,6 +204,10 @@ class Replay {
 
   /// Answers the pipeline's questions for the bias, as gps_bias_node does live, and writes what came of it.
   void settle() {
+    if (pipeline_.epoch() != epoch_) {
+      epoch_ = pipeline_.epoch();
+      bias_tracker_.reset();
+    }
     while (const auto query = pipeline_.bias_query()) {
       const BiasEstimate& bias =
           bias_tracker_.process(query->fix, query->predicted_antenna_position, query->sanitation);
@@ -211,7 +215,6 @@ class Replay {
       pipeline_.add_bias(bias);
     }
     for (const PipelineEvent& event : pipeline_.take_events()) {
-      if (event.text.rfind("reset", 0) == 0) bias_tracker_.reset();
       std::cerr << "[" << std::fixed << std::setprecision(3) << to_seconds(newest_) << "] " << event.text << '\n';
     }
     for (const LocalizationOutput& output : pipeline_.take_outputs()) {
@@ -238,6 +241,7 @@ class Replay {
   LocalizationPipeline pipeline_;
   BiasTracker bias_tracker_;
   rosbag::Bag bag_;
+  std::size_t epoch_{0};
   Stamp newest_{0};
   std::optional<GeodeticPosition> bag_datum_;
   Trajectory estimate_;

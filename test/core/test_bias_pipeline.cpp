@@ -204,6 +204,25 @@ TEST(BiasPipeline, ClockSetBackGivesTheSameRunAgainF21) {
   EXPECT_TRUE(said);
 }
 
+TEST(BiasPipeline, AnOdometryGapStartsTheBiasAnew) {
+  Rig rig("{odometry_gap: 2.0}");
+  const Eigen::Vector2d bias(6.0, 0.0);
+  const auto run = [&](double from_s, double to_s) {
+    BiasEstimate last;
+    for (double t = from_s; t <= to_s; t += 0.1) {
+      rig.drive(t);
+      rig.estimate(t);
+      rig.pipeline.add_fix(Rig::raw(t, Rig::truth(t).position() + bias));
+      for (const BiasEstimate& e : rig.take()) last = e;
+    }
+    return last;
+  };
+  const BiasEstimate before = run(0.0, 10.0);
+  EXPECT_NEAR(before.bias.x(), bias.x(), 1.0);
+  BiasEstimate after = run(15.0, 15.05);  // the first fix after the gap meets a filter that knows of no bias
+  EXPECT_GT(after.covariance(0, 0), 2.0 * before.covariance(0, 0));
+}
+
 TEST(BiasPipeline, EveryParameterHasAnEffectF36) {
   const auto trace = [](const std::string& yaml) {
     Rig rig(yaml);
@@ -236,7 +255,7 @@ TEST(BiasPipeline, EveryParameterHasAnEffectF36) {
       {"fix_sigma_ceiling", "100.0"},       {"fix_covariance_scale", "2.0"}, {"max_distance_from_datum", "1000.0"},
       {"bias_input", "position"},           {"shadow_sigma", "2.0"},         {"bias_acceleration_density", "1.0"},
       {"bias_rate_sigma", "1.0"},           {"gate_probability", "0.5"},     {"gate_timeout", "2.0"},
-      {"shadow_probability", "0.9"}};
+      {"shadow_probability", "0.9"},        {"odometry_gap", "0.05"}};
   const std::string plain = trace("{}");
   for (const std::string& name : parameter_names(BiasPipelineParameters{})) {
     ASSERT_EQ(changes.count(name), 1u) << name << " is not examined";

@@ -97,5 +97,11 @@ TEST(OdometryHistory, NoFieldOfAMessageMayBeAbsurdF25) {
   }
 }
 
+TEST(OdometryFault, AllowsThePaperSharpestTurn) {
+  // 10 m/s with the steering at its limit of 1.2 rad on a wheelbase of 1 m.
+  EXPECT_EQ(odometry_fault({Stamp(0), {}, {10.0, 10.0 * std::tan(1.2)}}), "");
+  EXPECT_NE(odometry_fault({Stamp(0), {}, {10.0, 1e3}}), "");
+}
+
 }  // namespace
 }  // namespace urban_gnss

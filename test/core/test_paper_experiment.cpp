@@ -10,19 +10,13 @@
 namespace urban_gnss {
 namespace {
 
-YAML::Node paper_file(const std::string& name) {
-  return YAML::LoadFile(PACKAGE_DIRECTORY "/config/paper_field/" + name + ".yaml");
-}
-
 /// The conditions of section 4, from the files that the nodes read, for one lap.
 PaperExperimentConditions conditions(int seed) {
-  PaperExperimentConditions c;
-  ParameterReader simulator(paper_file("simulator"));
-  simulator.ignore("field");
-  EXPECT_TRUE(simulator.read(c.field).read(c.field_motion).finish().empty());
-  EXPECT_TRUE(ParameterReader(paper_file("particle_filter")).read(c.filter).read(c.filter_motion).finish().empty());
-  EXPECT_TRUE(ParameterReader(paper_file("gps_bias")).read(c.bias).finish().empty());
-  EXPECT_TRUE(ParameterReader(paper_file("waypoint_controller")).read(c.controller).finish().empty());
+  PaperFiles files;
+  for (const std::string name : kPaperFileNames) {
+    files[name] = YAML::LoadFile(PACKAGE_DIRECTORY "/config/paper_field/" + name + ".yaml");
+  }
+  PaperExperimentConditions c = read_paper_conditions(files);
   c.laps = 1;
   c.field.seed = seed;
   c.filter.seed = seed;

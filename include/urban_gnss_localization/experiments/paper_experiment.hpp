@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -22,6 +23,14 @@ struct PaperExperimentConditions {
   int laps{3};
   bool closed_loop{true};  ///< steer on the estimate; otherwise on the truth
 };
+
+/// The YAML files of config/paper_field that the experiment shares with the nodes, by their names.
+using PaperFiles = std::map<std::string, YAML::Node>;
+inline constexpr const char* kPaperFileNames[] = {"simulator", "particle_filter", "gps_bias", "waypoint_controller"};
+
+/// The conditions that the files describe; the targets are the field's. Throws ParameterError with every fault of all
+/// files.
+PaperExperimentConditions read_paper_conditions(const PaperFiles& files);
 
 /// A way to estimate the pose, by the name that tables and files use.
 struct PaperMethod {

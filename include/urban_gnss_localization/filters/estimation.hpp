@@ -30,7 +30,7 @@ class ParticleClusters {
   ParticleClusters(std::size_t particle_count, double cell_m);
 
   /// Finds the clusters. Requires normalised weights; particles of less than a thousandth of the mean weight are left
-  /// out, so that a few of no importance bridge nothing.
+  /// out, so that a few of no importance bridge nothing. Requires no more particles than at construction.
   void find(const ParticleSet& particles);
 
   std::uint32_t count() const { return count_; }

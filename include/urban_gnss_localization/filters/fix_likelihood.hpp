@@ -11,7 +11,7 @@ namespace urban_gnss {
 enum class LikelihoodForm {
   kPrinted,  ///< sums of one-dimensional exponentials with two-dimensional normalisers, as in the text
   kSum,      ///< the same sums, each term normalised in its one dimension
-  kProduct,  ///< a bivariate Gaussian, and a ring that integrates to 1; the heading multiplies
+  kProduct,  ///< a bivariate Gaussian, and a ring that integrates to 1 where r-hat > 2 sigma_s; the heading multiplies
 };
 EnumNames<LikelihoodForm> enum_names(LikelihoodForm);
 

@@ -15,6 +15,7 @@ namespace urban_gnss {
 struct BiasPipelineParameters {
   std::vector<double> antenna_offset{0.0, 0.0};  ///< m, x and y of the antenna in the base frame
   double estimate_timeout{0.2};  ///< s after a fix at which odometry alone carries the last estimate to it
+  double odometry_gap{2.0};      ///< s without odometry after which nothing is known of the bias any more
   double time_jump{1.0};         ///< s, a stamp older by more than this is a clock that was set back
   bool reset_on_time_jump{true};
   FixSanitationParameters fix;
@@ -24,6 +25,7 @@ struct BiasPipelineParameters {
   void visit(V& v) {
     v("antenna_offset", antenna_offset);
     v("estimate_timeout", estimate_timeout, non_negative());
+    v("odometry_gap", odometry_gap, positive());
     v("time_jump", time_jump, positive());
     v("reset_on_time_jump", reset_on_time_jump);
     fix.visit(v);

@@ -142,6 +142,8 @@ class LocalizationPipeline {
   /// The fix that waits for its bias next, where the one who calls has the bias filter at hand.
   std::optional<BiasQuery> bias_query() const;
 
+  /// Changes where the odometry's history was forgotten (reset, gap): a bias tracked across that means nothing.
+  std::size_t epoch() const { return epoch_; }
   const std::optional<LocalFrame>& frame() const { return frame_; }
   bool initialized() const { return initialized_; }
   const Localizer& localizer() const { return *localizer_; }
@@ -167,6 +169,7 @@ class LocalizationPipeline {
   void forget_start();
   void correct_with(const PendingFix& pending, double radius_m);
   void decide(FixVerdict verdict);
+  void decide_unexamined(const PendingFix& pending, const char* reason);
   void guard_against_non_finite();
   Twist2 with_imu(const OdometrySample& sample, Stamp since);
   bool jumped(StampMonitor& monitor, Stamp stamp, const char* stream);
@@ -182,6 +185,7 @@ class LocalizationPipeline {
   std::optional<PoseEstimate> start_;  ///< where to start, until it is used
 
   OdometryHistory history_;
+  std::size_t epoch_{0};
   StampMonitor odometry_stamps_;
   StampMonitor fix_stamps_;
   StampMonitor imu_stamps_;
@@ -203,6 +207,7 @@ class LocalizationPipeline {
   std::uint64_t fixes_used_{0};
   std::uint64_t fixes_rejected_{0};
 
+  std::optional<Stamp> last_output_;
   std::vector<LocalizationOutput> outputs_;
   std::vector<FixVerdict> verdicts_;
   std::vector<PipelineEvent> events_;
