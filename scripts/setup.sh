@@ -17,7 +17,7 @@ build=$workspace/build
 devel=$workspace/devel
 log=$workspace/build.log
 noetic_packages="
-  build-essential cmake libbenchmark-dev libboost-dev libcli11-dev libeigen3-dev libgeographic-dev libgmock-dev libgtest-dev
+  build-essential cmake libbenchmark-dev libboost-dev libcli11-dev libeigen3-dev libgeographic-dev libgtest-dev
   libyaml-cpp-dev nlohmann-json3-dev python3-matplotlib python3-numpy
   ros-noetic-catkin ros-noetic-diagnostic-updater ros-noetic-geometry-msgs ros-noetic-message-generation
   ros-noetic-message-runtime ros-noetic-nav-msgs ros-noetic-rosbag ros-noetic-rosbag-storage ros-noetic-rosbash

@@ -35,8 +35,8 @@ BicycleInput WaypointController::steer(const Pose2& estimate) {
     if (finished()) return {};
   }
   const Eigen::Vector2d way = targets_[current_] - estimate.position();
-  const double bearing = std::atan2(way.y(), way.x());                                             // (38)
-  const double steering = parameters_.steering_gain * angle_difference(bearing, estimate.yaw);     // (36)
+  const double bearing = std::atan2(way.y(), way.x());                                          // (38)
+  const double steering = parameters_.steering_gain * angle_difference(bearing, estimate.yaw);  // (36)
   return {parameters_.speed, std::clamp(steering, -parameters_.max_steering, parameters_.max_steering)};
 }
 

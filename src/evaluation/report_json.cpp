@@ -6,9 +6,7 @@ namespace urban_gnss {
 namespace {
 
 /// The library would write a NaN as null by itself, but only in text: the value itself must be null for its readers.
-nlohmann::json number(double value) {
-  return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr);
-}
+nlohmann::json number(double value) { return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr); }
 
 nlohmann::json to_json(const Summary& summary) {
   return {{"mean", number(summary.mean)},     {"sigma", number(summary.sigma)}, {"rmse", number(summary.rmse)},

@@ -88,9 +88,9 @@ void BiasTracker::start(const Eigen::Vector2d& measurement) {
 const BiasEstimate& BiasTracker::process(const LocalFix& fix, const Eigen::Vector2d& predicted_antenna_position,
                                          const FixVerdict& sanitation) {
   const bool on_position = parameters_.bias_input == BiasInput::kPosition;
-  const Eigen::Vector2d measurement = on_position ? fix.position : Eigen::Vector2d(fix.position - predicted_antenna_position);
-  const Eigen::Matrix2d noise =
-      parameters_.shadow_sigma * parameters_.shadow_sigma * Eigen::Matrix2d::Identity();
+  const Eigen::Vector2d measurement =
+      on_position ? fix.position : Eigen::Vector2d(fix.position - predicted_antenna_position);
+  const Eigen::Matrix2d noise = parameters_.shadow_sigma * parameters_.shadow_sigma * Eigen::Matrix2d::Identity();
   if (!started_) {
     start(measurement);
     last_accepted_ = fix.stamp;

@@ -47,8 +47,8 @@ class Evaluator {
       x += c * fix_.antenna_in_body.x() - s * fix_.antenna_in_body.y();
       y += s * fix_.antenna_in_body.x() + c * fix_.antenna_in_body.y();
     }
-    const double dx = x - fix_.fix.x();  // (28)
-    const double dy = y - fix_.fix.y();  // (29)
+    const double dx = x - fix_.fix.x();                                                          // (28)
+    const double dy = y - fix_.fix.y();                                                          // (29)
     const double d_heading = fix_.with_heading ? angle_difference(yaw, fix_.fix_heading) : 0.0;  // (30)
     const double d_ring = fix_.with_shadow ? std::sqrt(dx * dx + dy * dy) - fix_.radius : 0.0;   // (32)
     return fix_.form == LikelihoodForm::kProduct ? product(dx, dy, d_heading, d_ring) : sum(dx, dy, d_heading, d_ring);

@@ -25,7 +25,7 @@ EnumNames<LikelihoodChoice> enum_names(LikelihoodChoice) {
           {"product", LikelihoodChoice::kProduct}};
 }
 
-EnumNames<Switch> enum_names(Switch) { 
+EnumNames<Switch> enum_names(Switch) {
   return {{"auto", Switch::kAuto}, {"always", Switch::kAlways}, {"never", Switch::kNever}};
 }
 
@@ -154,10 +154,10 @@ FixLikelihood ParticleFilter::likelihood_of(const FixMeasurement& fix) const {
   likelihood.with_heading = parameters_.uses_gps_heading();
   likelihood.fix = fix.position;
   likelihood.antenna_in_body = fix.antenna_in_body;
-  likelihood.direct_covariance = parameters_.use_fix_covariance
-                                     ? fix.covariance
-                                     : Eigen::Matrix2d(parameters_.direct_sigma * parameters_.direct_sigma *
-                                                       Eigen::Matrix2d::Identity());
+  likelihood.direct_covariance =
+      parameters_.use_fix_covariance
+          ? fix.covariance
+          : Eigen::Matrix2d(parameters_.direct_sigma * parameters_.direct_sigma * Eigen::Matrix2d::Identity());
   likelihood.shadow_sigma = parameters_.shadow_sigma;
   likelihood.heading_sigma = parameters_.gps_heading_sigma;
   likelihood.radius = fix.bias_radius_m;

@@ -46,12 +46,12 @@ void RingSampler::sample(ParticleSet& particles, const Pose2& predicted, double 
     const auto pick = k + static_cast<std::size_t>(draw_uniform(engine) * static_cast<double>(remaining - k));
     std::swap(order_[k], order_[pick]);
     const std::size_t i = order_[k];
-    const double psi = kPi * (2.0 * draw_uniform(engine) - 1.0);           // (25)
-    const double rho = radius_m + radius_sigma_m * draw_normal(engine);    // (24)
-    particles.x[i] = predicted.x + rho * std::cos(psi);                    // (23)
+    const double psi = kPi * (2.0 * draw_uniform(engine) - 1.0);         // (25)
+    const double rho = radius_m + radius_sigma_m * draw_normal(engine);  // (24)
+    particles.x[i] = predicted.x + rho * std::cos(psi);                  // (23)
     particles.y[i] = predicted.y + rho * std::sin(psi);
     particles.yaw[i] = predicted.yaw;
-    particles.log_weight[i] = log_scale - 0.5 * rho * rho / variance;      // (26)
+    particles.log_weight[i] = log_scale - 0.5 * rho * rho / variance;  // (26)
   }
 }
 

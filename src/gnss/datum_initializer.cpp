@@ -44,8 +44,8 @@ std::optional<GeodeticPosition> DatumInitializer::fixed() const {
 
 std::optional<GeodeticPosition> DatumInitializer::add(const RawFix& raw) {
   if (const auto datum = fixed()) return datum;
-  const bool is_known = std::any_of(window_.begin(), window_.end(),
-                                    [&](const RawFix& known) { return known.stamp == raw.stamp; });
+  const bool is_known =
+      std::any_of(window_.begin(), window_.end(), [&](const RawFix& known) { return known.stamp == raw.stamp; });
   if (is_usable_position(raw) && !is_known) {
     window_.push_back(raw);
     if (window_.size() > static_cast<std::size_t>(parameters_.datum_fix_count)) window_.pop_front();

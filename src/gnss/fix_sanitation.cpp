@@ -124,8 +124,8 @@ Eigen::Matrix2d usable_covariance(const RawFix& raw, const FixSanitationParamete
 
 void FixSanitationParameters::check(std::vector<std::string>& faults) const {
   if (!(fix_sigma_floor <= fix_sigma_ceiling)) {
-    faults.push_back("fix_sigma_floor = " + number(fix_sigma_floor) + ": must be at most fix_sigma_ceiling = " +
-                     number(fix_sigma_ceiling));
+    faults.push_back("fix_sigma_floor = " + number(fix_sigma_floor) +
+                     ": must be at most fix_sigma_ceiling = " + number(fix_sigma_ceiling));
   } else if (!(fix_sigma_floor <= fix_sigma_default && fix_sigma_default <= fix_sigma_ceiling)) {
     faults.push_back("fix_sigma_default = " + number(fix_sigma_default) + ": must be at least fix_sigma_floor = " +
                      number(fix_sigma_floor) + " and at most fix_sigma_ceiling = " + number(fix_sigma_ceiling));

@@ -32,10 +32,9 @@ HeadingInitializer::HeadingInitializer(HeadingInitializerParameters parameters) 
 
 void HeadingInitializer::add(const Pose2& odometry_pose_at_fix, const LocalFix& fix) {
   const double information = 2.0 / fix.covariance.trace();
-  const bool is_usable = is_finite(odometry_pose_at_fix) &&
-                         odometry_pose_at_fix.position().lpNorm<Eigen::Infinity>() < kMaxOdometry_m &&
-                         fix.position.allFinite() && fix.covariance.allFinite() && std::isfinite(information) &&
-                         information > 0.0;
+  const bool is_usable =
+      is_finite(odometry_pose_at_fix) && odometry_pose_at_fix.position().lpNorm<Eigen::Infinity>() < kMaxOdometry_m &&
+      fix.position.allFinite() && fix.covariance.allFinite() && std::isfinite(information) && information > 0.0;
   if (!is_usable || (!samples_.empty() && fix.stamp <= samples_.back().fix.stamp)) return;
   if (!first_stamp_) first_stamp_ = fix.stamp;
   samples_.push_back({odometry_pose_at_fix, fix, information});

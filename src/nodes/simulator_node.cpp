@@ -36,11 +36,11 @@ EnumNames<Field> enum_names(Field) { return {{"paper_field", Field::kPaperField}
 struct NodeParameters {
   Field field{Field::kPaperField};
   std::vector<double> datum{33.8903, 130.8394, 0.0};  ///< deg, deg, m: where the map frame's origin is in the world
-  bool publish_clock{true};         ///< simulated time on /clock; the other nodes then need use_sim_time
-  double real_time_factor{1.0};     ///< seconds of the simulation in a second, at the most
-  bool wait_for_command{true};      ///< after each step, wait for the command that answers it
-  double command_wait{0.05};        ///< s of wall time, the longest such wait
-  double command_timeout{0.5};      ///< s of simulated time without a command after which the robot stands
+  bool publish_clock{true};      ///< simulated time on /clock; the other nodes then need use_sim_time
+  double real_time_factor{1.0};  ///< seconds of the simulation in a second, at the most
+  bool wait_for_command{true};   ///< after each step, wait for the command that answers it
+  double command_wait{0.05};     ///< s of wall time, the longest such wait
+  double command_timeout{0.5};   ///< s of simulated time without a command after which the robot stands
 
   template <class V>
   void visit(V& v) {

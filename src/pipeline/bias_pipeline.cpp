@@ -117,8 +117,7 @@ bool BiasPipeline::process_next_fix() {
   const SanitizedFix& next = pending_.front();
   const Stamp stamp = next.fix.stamp;
   const bool has_estimate = poses_.back().first >= stamp;
-  const bool has_waited =
-      !history_.empty() && to_seconds(history_.latest() - stamp) >= parameters_.estimate_timeout;
+  const bool has_waited = !history_.empty() && to_seconds(history_.latest() - stamp) >= parameters_.estimate_timeout;
   if (!has_estimate && !has_waited) return false;
   if (const auto pose = pose_at(stamp)) {
     const Eigen::Vector2d offset(parameters_.antenna_offset[0], parameters_.antenna_offset[1]);

@@ -1,30 +1,18 @@
 #include "urban_gnss_localization/pipeline/localization_pipeline.hpp"
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
-#include <sstream>
-#include <stdexcept>
 #include <utility>
+
+#include "text.hpp"
 
 namespace urban_gnss {
 namespace {
 
 constexpr double kHistory_s = 10.0;
 constexpr std::size_t kMaxWaitingFixes = 1000;
-constexpr double kLeastClusterMass = 0.5;
-constexpr double kFarSigmas = 3.0;
 /// A fix that is farther ahead of the odometry than this has a wrong stamp.
 constexpr double kMaxAhead_s = 10.0;
-/// Fixes closer together than this share their error: for the start they count as one.
-constexpr double kStartFixInterval_s = 1.0;
-
-std::string seconds_text(double seconds) {
-  std::ostringstream out;
-  out.precision(3);
-  out << seconds << " s";
-  return out.str();
-}
 
 }  // namespace
 
@@ -37,19 +25,6 @@ void LocalizationParameters::check(std::vector<std::string>& faults) const {
   datum.check(faults);
   fix.check(faults);
   heading.check(faults);
-}
-
-const char* to_string(LocalizationState state) {
-  switch (state) {
-    case LocalizationState::kWaitingForOdometry: return "waiting for odometry";
-    case LocalizationState::kWaitingForFix: return "waiting for a fix";
-    case LocalizationState::kWaitingForDatum: return "waiting for the datum";
-    case LocalizationState::kInitializing: return "initializing";
-    case LocalizationState::kTracking: return "tracking";
-    case LocalizationState::kDeadReckoning: return "dead reckoning";
-    case LocalizationState::kLost: return "lost";
-  }
-  return "?";
 }
 
 Pose2 map_to_odometry(const LocalizationOutput& output) {
@@ -105,41 +80,6 @@ void LocalizationPipeline::reset(const std::string& why) {
     frame_.reset();
     if (const auto datum = datum_initializer_.fixed()) use_datum(*datum, "parameter");
   }
-}
-
-void LocalizationPipeline::use_datum(const GeodeticPosition& datum, const std::string& source) {
-  frame_.emplace(datum);
-  std::ostringstream text;
-  text.precision(10);
-  text << "datum from " << source << ": latitude " << datum.latitude_deg << ", longitude " << datum.longitude_deg
-       << ", altitude " << datum.altitude_m << " m";
-  event(PipelineEvent::Level::kInfo, text.str());
-  const std::deque<RawFix> waiting = std::exchange(before_datum_, {});
-  for (const RawFix& fix : waiting) sanitize(fix);
-  process_fixes();
-}
-
-void LocalizationPipeline::set_datum(const GeodeticPosition& datum) {
-  LocalFrame checked(datum);  // throws before anything changes
-  datum_was_set_ = true;
-  if (frame_) {
-    const GeodeticPosition& old = frame_->datum();
-    const bool is_same = old.latitude_deg == datum.latitude_deg && old.longitude_deg == datum.longitude_deg &&
-                         old.altitude_m == datum.altitude_m;
-    if (is_same) return;
-    frame_ = std::move(checked);
-    reset("the datum was set to another place");
-    return;
-  }
-  use_datum(datum, "request");
-}
-
-void LocalizationPipeline::set_pose(const PoseEstimate& pose) {
-  if (!is_finite(pose.pose) || !pose.covariance.allFinite()) {
-    throw std::invalid_argument("pose or covariance is not finite");
-  }
-  start_ = pose;
-  if (frame_ && last_odometry_) start(pose, "a pose that was set");
 }
 
 bool LocalizationPipeline::jumped(StampMonitor& monitor, Stamp stamp, const char* stream) {
@@ -257,8 +197,7 @@ std::optional<BiasQuery> LocalizationPipeline::bias_query() const {
   const PendingFix& next = pending_.front();
   const auto motion = history_.motion_between(history_.latest(), next.fix.stamp);
   if (!motion) return std::nullopt;
-  return BiasQuery{next.fix, next.sanitation,
-                   transform_point(compose(localizer_->pose(), *motion), antenna_offset())};
+  return BiasQuery{next.fix, next.sanitation, transform_point(compose(localizer_->pose(), *motion), antenna_offset())};
 }
 
 Eigen::Vector2d LocalizationPipeline::antenna_offset() const {
@@ -305,8 +244,8 @@ bool LocalizationPipeline::process_next_fix() {
       return true;
     }
     if (to_seconds(history_.latest() - next.fix.stamp) < parameters_.bias_timeout) return false;
-    event(PipelineEvent::Level::kWarn, "no gps/bias for a fix within " + seconds_text(parameters_.bias_timeout) +
-                                           ": the last radius is used");
+    event(PipelineEvent::Level::kWarn,
+          "no gps/bias for a fix within " + seconds_text(parameters_.bias_timeout) + ": the last radius is used");
   }
   pending_.pop_front();
   if (!restart_if_lost(next)) correct_with(next, last_radius_m_);
@@ -328,80 +267,6 @@ void LocalizationPipeline::correct_with(const PendingFix& pending, double radius
   if (verdict.reason.empty()) verdict.reason = pending.sanitation.reason;
   decide(std::move(verdict));
   guard_against_non_finite();
-}
-
-void LocalizationPipeline::initialize_with(const PendingFix& pending) {
-  decide_unexamined(pending, "used for the start");
-  remember_for_start(pending);
-  try_start(pending);
-}
-
-void LocalizationPipeline::remember_for_start(const PendingFix& pending) {
-  if (last_start_fix_ && to_seconds(pending.fix.stamp - *last_start_fix_) < kStartFixInterval_s) return;
-  last_start_fix_ = pending.fix.stamp;
-  const Eigen::Vector2d offset = antenna_offset();
-  const Pose2 antenna{offset.x(), offset.y(), 0.0};
-  heading_initializer_.add(compose(*history_.pose_at(pending.fix.stamp), antenna), pending.fix);
-}
-
-bool LocalizationPipeline::try_start(const PendingFix& pending) {
-  if (last_start_fix_ != pending.fix.stamp) return false;  // nothing new since the last try
-  std::optional<PoseEstimate> found = heading_initializer_.estimate();
-  std::string how = "fixes and motion";
-  if (!found && !initialized_ && heading_initializer_.timed_out()) {
-    found = heading_initializer_.without_heading();
-    how = "fixes, heading unknown";
-  }
-  if (!found) return false;
-  // The mean of the fixes is no better than their common error, which their scatter does not show.
-  found->covariance.topLeftCorner<2, 2>() += pending.fix.covariance;
-  const Eigen::Vector2d offset = antenna_offset();
-  const Pose2 since = *history_.motion_between(pending.fix.stamp, history_.latest());
-  found->pose = compose(compose(found->pose, inverse(Pose2{offset.x(), offset.y(), 0.0})), since);
-  last_used_ = pending.fix.stamp;
-  start(*found, how);
-  return true;
-}
-
-bool LocalizationPipeline::restart_if_lost(const PendingFix& pending) {
-  remember_for_start(pending);
-  const Pose2 since = *history_.motion_between(history_.latest(), pending.fix.stamp);
-  const Eigen::Vector2d predicted = transform_point(compose(localizer_->pose(), since), antenna_offset());
-  const double sigma = std::sqrt(pending.fix.covariance.trace());  // of the distance, as the receiver declares it
-  if ((pending.fix.position - predicted).norm() <= parameters_.max_bias_radius + kFarSigmas * sigma) {
-    far_since_.reset();
-    lost_ = false;
-    return false;
-  }
-  if (!far_since_) far_since_ = pending.fix.stamp;
-  if (to_seconds(pending.fix.stamp - *far_since_) < parameters_.lost_timeout) return false;
-  if (!lost_) {
-    event(PipelineEvent::Level::kWarn, "lost: every fix of the last " + seconds_text(parameters_.lost_timeout) +
-                                           " is farther than max_bias_radius");
-  }
-  lost_ = true;
-  if (!try_start(pending)) return false;
-  decide_unexamined(pending, "used for a new start");
-  return true;
-}
-
-void LocalizationPipeline::start(const PoseEstimate& pose, const std::string& how) {
-  localizer_->initialize(pose);
-  initialized_ = true;
-  lost_ = false;
-  far_since_.reset();
-  start_.reset();
-  last_radius_m_ = 0.0;
-  std::ostringstream text;
-  text.precision(4);
-  text << "started from " << how << ": x " << pose.pose.x << " m, y " << pose.pose.y << " m, yaw " << pose.pose.yaw
-       << " rad";
-  event(PipelineEvent::Level::kInfo, text.str());
-}
-
-void LocalizationPipeline::forget_start() {
-  heading_initializer_.reset();
-  last_start_fix_.reset();
 }
 
 void LocalizationPipeline::decide_unexamined(const PendingFix& pending, const char* reason) {
@@ -438,58 +303,5 @@ void LocalizationPipeline::event(PipelineEvent::Level level, const std::string& 
 std::vector<LocalizationOutput> LocalizationPipeline::take_outputs() { return std::exchange(outputs_, {}); }
 std::vector<FixVerdict> LocalizationPipeline::take_verdicts() { return std::exchange(verdicts_, {}); }
 std::vector<PipelineEvent> LocalizationPipeline::take_events() { return std::exchange(events_, {}); }
-
-std::string LocalizationPipeline::waiting_for() const {
-  if (initialized_) return {};
-  if (!last_odometry_) return "odometry";
-  if (!frame_) return "the datum: " + datum_initializer_.waiting_for();
-  if (!last_fix_stamp_) return "a usable fix";
-  return "the start: " + heading_initializer_.waiting_for();
-}
-
-LocalizationReport LocalizationPipeline::report() const {
-  LocalizationReport report;
-  report.last_fix = last_verdict_;
-  report.fixes_used = fixes_used_;
-  report.fixes_rejected = fixes_rejected_;
-  report.bias_radius_m = last_radius_m_;
-  if (last_odometry_ && last_used_) report.fix_age_s = to_seconds(last_odometry_->stamp - *last_used_);
-  if (last_odometry_ && last_fix_stamp_) {
-    report.odometry_age_s = std::max(0.0, to_seconds(*last_fix_stamp_ - last_odometry_->stamp));
-  }
-  if (!initialized_) {
-    report.state = lost_              ? LocalizationState::kLost
-                   : !last_odometry_  ? LocalizationState::kWaitingForOdometry
-                   : !last_fix_stamp_ && frame_ ? LocalizationState::kWaitingForFix
-                   : !frame_          ? LocalizationState::kWaitingForDatum
-                                      : LocalizationState::kInitializing;
-    report.reason = "waiting for " + waiting_for();
-    return report;
-  }
-  const PoseEstimate estimate = localizer_->estimate();
-  report.health = localizer_->health();
-  const Eigen::Matrix2d position = estimate.covariance.topLeftCorner<2, 2>();
-  report.position_sigma_m =
-      std::sqrt(std::max(0.0, Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(position).eigenvalues()(1)));
-  report.heading_converged = report.health.heading_sigma_rad < parameters_.heading_converged_sigma;
-  const bool is_starved = !(report.fix_age_s <= parameters_.fix_timeout);
-  report.state = lost_          ? LocalizationState::kLost
-                 : is_starved ? LocalizationState::kDeadReckoning
-                              : LocalizationState::kTracking;
-  if (lost_) {
-    report.reason = "every fix is farther than max_bias_radius";
-  } else if (is_starved) {
-    report.reason = last_used_ ? "no fix was used for " + seconds_text(report.fix_age_s) : "no fix was used yet";
-  } else if (report.odometry_age_s > parameters_.odometry_gap) {
-    report.reason = "no odometry for " + seconds_text(report.odometry_age_s);
-  } else if (!report.heading_converged) {
-    report.reason = "heading not known yet";
-  } else if (report.health.cluster_mass < kLeastClusterMass) {
-    report.reason = "particles disagree: no cluster holds half of the weight";
-  } else {
-    report.healthy = true;
-  }
-  return report;
-}
 
 }  // namespace urban_gnss

@@ -65,11 +65,8 @@ RawFix to_raw_fix(const sensor_msgs::NavSatFix& message) {
     case sensor_msgs::NavSatFix::COVARIANCE_TYPE_DIAGONAL_KNOWN:
       fix.covariance_type = CovarianceType::kDiagonalKnown;
       break;
-    case sensor_msgs::NavSatFix::COVARIANCE_TYPE_KNOWN:
-      fix.covariance_type = CovarianceType::kKnown;
-      break;
-    default:
-      fix.covariance_type = CovarianceType::kUnknown;
+    case sensor_msgs::NavSatFix::COVARIANCE_TYPE_KNOWN: fix.covariance_type = CovarianceType::kKnown; break;
+    default: fix.covariance_type = CovarianceType::kUnknown;
   }
   return fix;
 }
@@ -108,9 +105,7 @@ std::optional<double> to_yaw_rate(const sensor_msgs::Imu& message) {
   return is_oriented ? (orientation.normalized() * rate).z() : rate.z();
 }
 
-Pose2 to_pose2(const geometry_msgs::Pose& pose) {
-  return {pose.position.x, pose.position.y, yaw_of(pose.orientation)};
-}
+Pose2 to_pose2(const geometry_msgs::Pose& pose) { return {pose.position.x, pose.position.y, yaw_of(pose.orientation)}; }
 
 geometry_msgs::Pose to_message(const Pose2& pose) {
   geometry_msgs::Pose message;
@@ -237,8 +232,8 @@ BiasEstimate to_bias_estimate(const msgs::GpsBias& message) {
   return bias;
 }
 
-msgs::LocalizationStatus to_message(const LocalizationReport& report, const Localizer& localizer,
-                                    const ros::Time& time, const std::string& map_frame) {
+msgs::LocalizationStatus to_message(const LocalizationReport& report, const Localizer& localizer, const ros::Time& time,
+                                    const std::string& map_frame) {
   msgs::LocalizationStatus message;
   message.header.stamp = time;
   message.header.frame_id = map_frame;
@@ -273,8 +268,7 @@ geometry_msgs::PoseArray to_pose_array(const ParticleSet& particles, const ros::
   return message;
 }
 
-sensor_msgs::PointCloud2 to_point_cloud(const ParticleSet& particles, const ros::Time& time,
-                                        const std::string& frame) {
+sensor_msgs::PointCloud2 to_point_cloud(const ParticleSet& particles, const ros::Time& time, const std::string& frame) {
   sensor_msgs::PointCloud2 message;
   message.header.stamp = time;
   message.header.frame_id = frame;

@@ -221,8 +221,7 @@ void LocalizerNode::look_up_antenna() {
     return;
   }
   try {
-    const auto transform =
-        tf_buffer_.lookupTransform(parameters_.frames.base_link, fix_watch_.frame(), ros::Time(0));
+    const auto transform = tf_buffer_.lookupTransform(parameters_.frames.base_link, fix_watch_.frame(), ros::Time(0));
     const auto& offset = transform.transform.translation;
     pipeline_.set_antenna_offset({offset.x, offset.y});
     ROS_INFO_STREAM("antenna at x " << offset.x << " m, y " << offset.y << " m in " << parameters_.frames.base_link);
@@ -255,9 +254,9 @@ void LocalizerNode::every_five_seconds() {
 void LocalizerNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
   const LocalizationReport report = pipeline_.report();
   using diagnostic_msgs::DiagnosticStatus;
-  const auto level = report.healthy                               ? DiagnosticStatus::OK
+  const auto level = report.healthy                             ? DiagnosticStatus::OK
                      : report.state == LocalizationState::kLost ? DiagnosticStatus::ERROR
-                                                                  : DiagnosticStatus::WARN;
+                                                                : DiagnosticStatus::WARN;
   status.summary(level, report.healthy ? "tracking" : report.reason);
   status.add("state", to_string(report.state));
   status.add("mode", pipeline_.localizer().mode());

@@ -57,8 +57,8 @@ visualization_msgs::MarkerArray bias_markers(const BiasEstimate& bias, const std
   ring.scale.x = 0.25 * size;
   for (int i = 0; i <= kSegments; ++i) {
     const double angle = 2.0 * kPi * i / kSegments;
-    ring.points.push_back(point(centre.x() + bias.radius_m * std::cos(angle),
-                                centre.y() + bias.radius_m * std::sin(angle), kHeight_m));
+    ring.points.push_back(
+        point(centre.x() + bias.radius_m * std::cos(angle), centre.y() + bias.radius_m * std::sin(angle), kHeight_m));
   }
   Marker arrow = make_marker("bias", 0, Marker::ARROW, colour, time, map_frame);
   set_scale(arrow, 0.35 * size, 1.2 * size, 1.8 * size);
@@ -83,8 +83,8 @@ visualization_msgs::MarkerArray target_markers(const std::vector<Eigen::Vector2d
     Marker disc = make_marker("targets", id, Marker::CYLINDER, colour, time, map_frame);
     disc.pose.position = point(targets[i].x(), targets[i].y(), 0.05);
     set_scale(disc, 1.0, 1.0, 0.1);
-    Marker label = make_marker("target_numbers", id, Marker::TEXT_VIEW_FACING, {1.0F, 1.0F, 1.0F, 1.0F}, time,
-                               map_frame);
+    Marker label =
+        make_marker("target_numbers", id, Marker::TEXT_VIEW_FACING, {1.0F, 1.0F, 1.0F, 1.0F}, time, map_frame);
     label.pose.position = point(1.12 * targets[i].x(), 1.12 * targets[i].y(), 0.6);
     label.scale.z = 1.2;
     label.text = std::to_string(i + 1);
@@ -95,8 +95,7 @@ visualization_msgs::MarkerArray target_markers(const std::vector<Eigen::Vector2d
 }
 
 visualization_msgs::MarkerArray field_markers(double shadow_border_m, double extent_m, const Pose2& truth,
-                                              double wheelbase_m, const ros::Time& time,
-                                              const std::string& map_frame) {
+                                              double wheelbase_m, const ros::Time& time, const std::string& map_frame) {
   Marker shadow = make_marker("shadow", 0, Marker::CUBE, {0.35F, 0.3F, 0.5F, 0.45F}, time, map_frame);
   shadow.pose.position = point(0.5 * (shadow_border_m - extent_m), 0.0, -0.06);
   set_scale(shadow, shadow_border_m + extent_m, 2.0 * extent_m, 0.02);

@@ -39,8 +39,8 @@ PaperField::PaperField(const PaperFieldParameters& parameters, const MotionParam
 
 void PaperField::step(const BicycleInput& input) {
   const Twist2 twist{input.speed_mps, yaw_rate(input, motion_.wheelbase)};
-  truth_ = move_noisily(truth_, make_motion_step(twist, parameters_.interval, motion_),
-                        draw_motion_noise(motion_engine_));
+  truth_ =
+      move_noisily(truth_, make_motion_step(twist, parameters_.interval, motion_), draw_motion_noise(motion_engine_));
 }
 
 SimulatedFix PaperField::fix() {

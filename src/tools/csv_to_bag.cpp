@@ -63,9 +63,8 @@ class BagContents {
   template <class Message>
   void add(const std::string& topic, Stamp stamp, const Message& message) {
     auto shared = std::make_shared<const Message>(message);
-    entries_.push_back({stamp, [topic, shared](rosbag::Bag& bag, Stamp time) {
-                          bag.write(topic, to_ros(time), *shared);
-                        }});
+    entries_.push_back(
+        {stamp, [topic, shared](rosbag::Bag& bag, Stamp time) { bag.write(topic, to_ros(time), *shared); }});
     const auto known = std::find_if(topics_.begin(), topics_.end(), [&](const Topic& t) { return t.name == topic; });
     if (known == topics_.end()) {
       topics_.push_back({topic, 1, stamp, stamp});
@@ -206,8 +205,8 @@ void add_fixes(const CsvTable& table, const LocalFrame& frame, BagContents& cont
     const double variances[] = {table.optional_number(row, xx), table.optional_number(row, xy),
                                 table.optional_number(row, yy), table.optional_number(row, zz)};
     if (std::all_of(std::begin(variances), std::end(variances), [](double v) { return std::isfinite(v); })) {
-      fix.position_covariance = {variances[0], variances[1], 0.0, variances[1], variances[2], 0.0, 0.0, 0.0,
-                                 variances[3]};
+      fix.position_covariance = {variances[0], variances[1], 0.0, variances[1], variances[2],
+                                 0.0,          0.0,          0.0, variances[3]};
       fix.position_covariance_type = sensor_msgs::NavSatFix::COVARIANCE_TYPE_KNOWN;
     }
     contents.add("/gps/fix", table.stamp(row), fix);
@@ -290,7 +289,7 @@ void add_satellites(const CsvTable& table, BagContents& contents) {
       satellite.pseudorange_residual = static_cast<float>(table.optional_number(row, residual_column));
       // Where the file does not say whether a satellite was received, nothing speaks against it.
       satellite.tracked = table.text(row, received_column) != "0";
-      satellite.used = !satellite.tracked                             ? Satellite::NOT_USED
+      satellite.used = !satellite.tracked                              ? Satellite::NOT_USED
                        : std::isfinite(satellite.pseudorange_residual) ? Satellite::USED
                                                                        : Satellite::USE_UNKNOWN;
       array.satellites.push_back(satellite);
@@ -360,8 +359,7 @@ void add_truth(const CsvTable& table, BagContents& contents) {
     truth.header.stamp = to_ros(table.stamp(row));
     truth.header.frame_id = "map";
     truth.child_frame_id = "base_link";
-    truth.pose.pose =
-        urban_gnss::to_message(Pose2{table.number(row, x), table.number(row, y), table.number(row, yaw)});
+    truth.pose.pose = urban_gnss::to_message(Pose2{table.number(row, x), table.number(row, y), table.number(row, yaw)});
     truth.pose.pose.position.z = or_zero(table.optional_number(row, z));
     truth.twist.twist.linear.x = or_zero(table.optional_number(row, speed));
     contents.add("/ground_truth/odom", table.stamp(row), truth);
@@ -408,8 +406,10 @@ int main(int argc, char** argv) {
   std::string output;
   std::string gnss_file = "gnss.csv";
   OdometryNoise noise;
-  app.add_option("DIR", folder, "folder with meta.json, odom.csv and the fixes; sats.csv, gnss_vel.csv, imu.csv and "
-                                "truth.csv are used where present")->required();
+  app.add_option("DIR", folder,
+                 "folder with meta.json, odom.csv and the fixes; sats.csv, gnss_vel.csv, imu.csv and "
+                 "truth.csv are used where present")
+      ->required();
   app.add_option("OUT", output, "bag to write")->required();
   app.add_option("--gnss-file", gnss_file, "file in DIR with the fixes (default gnss.csv)");
   app.add_option("--speed-sigma", noise.speed_mps, "declared noise of the odometry's speed, m/s (default 0.05)")

@@ -74,7 +74,6 @@ std::string as_file_name(std::string name) {
   return name;
 }
 
-
 /// Calls `use` with every message of the topic, written with or without a leading slash. False where there is none.
 template <class Message, class Use>
 bool for_each_message(const rosbag::Bag& bag, const std::string& topic, Use use) {
@@ -285,11 +284,10 @@ void print_table(std::ostream& out, const std::vector<Run>& runs) {
   for (const Run& run : runs) {
     const auto& summary = run.errors.summary;
     const Summary& position = summary.position_m;
-    out << std::left << std::setw(static_cast<int>(width)) << run.name << std::right << std::setw(9)
-        << summary.samples;
+    out << std::left << std::setw(static_cast<int>(width)) << run.name << std::right << std::setw(9) << summary.samples;
     number(summary.coverage, 10, 3);
-    for (const double metres : {position.median, position.mean, position.sigma, position.rmse, position.p95,
-                                position.max}) {
+    for (const double metres :
+         {position.median, position.mean, position.sigma, position.rmse, position.p95, position.max}) {
       number(metres, 9, 2);
     }
     number(urban_gnss::radians_to_degrees(summary.heading_rad.rmse), 13, 2);

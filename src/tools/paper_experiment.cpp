@@ -1,5 +1,7 @@
 // Monte Carlo of the simulation of Nishida et al., section 4: seeds x laps x methods, all on the same noise.
 
+#include "urban_gnss_localization/experiments/paper_experiment.hpp"
+
 #include <ros/package.h>
 #include <sys/utsname.h>
 
@@ -19,7 +21,6 @@
 
 #include "urban_gnss_localization/common/progress.hpp"
 #include "urban_gnss_localization/evaluation/statistics.hpp"
-#include "urban_gnss_localization/experiments/paper_experiment.hpp"
 #include "urban_gnss_localization/ros/plotting.hpp"
 
 namespace fs = std::filesystem;
@@ -47,7 +48,7 @@ struct Options {
 
 /// Errors of one run, and the positions of its curve.
 struct RunErrors {
-  std::vector<double> position_m[2];   ///< sun, shadow
+  std::vector<double> position_m[2];  ///< sun, shadow
   std::vector<double> heading_rad[2];
   std::vector<double> cross_track_m;
   std::vector<double> curve_position_m;
@@ -65,9 +66,9 @@ YAML::Node load_yaml(const fs::path& file) {
 }
 
 PaperExperimentConditions load_conditions(const Options& options) {
-  const fs::path directory =
-      options.config.empty() ? fs::path(ros::package::getPath("urban_gnss_localization")) / "config" / "paper_field"
-                             : fs::path(options.config);
+  const fs::path directory = options.config.empty()
+                                 ? fs::path(ros::package::getPath("urban_gnss_localization")) / "config" / "paper_field"
+                                 : fs::path(options.config);
   PaperFiles files;
   for (const char* name : kPaperFileNames) files[name] = load_yaml(directory / (std::string(name) + ".yaml"));
   for (const std::string& text : options.overrides) {
@@ -175,7 +176,9 @@ RunErrors run(const PaperMethod& method, PaperExperimentConditions conditions, i
   return errors;
 }
 
-void append(std::vector<double>& all, const std::vector<double>& part) { all.insert(all.end(), part.begin(), part.end()); }
+void append(std::vector<double>& all, const std::vector<double>& part) {
+  all.insert(all.end(), part.begin(), part.end());
+}
 
 nlohmann::json number(double value) { return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr); }
 
@@ -188,8 +191,9 @@ nlohmann::json zone_json(const std::vector<RunErrors>& runs, int zone) {
   }
   const Summary p = summarize(std::move(position));
   const Summary h = summarize(std::move(heading));
-  return {{"position_rmse_m", number(p.rmse)}, {"position_p95_m", number(p.p95)}, {"position_max_m", number(p.max)},
-          {"position_median_m", number(p.median)}, {"heading_rmse_rad", number(h.rmse)}, {"steps", p.count}};
+  return {{"position_rmse_m", number(p.rmse)},  {"position_p95_m", number(p.p95)},
+          {"position_max_m", number(p.max)},    {"position_median_m", number(p.median)},
+          {"heading_rmse_rad", number(h.rmse)}, {"steps", p.count}};
 }
 
 nlohmann::json method_json(const PaperMethod& method, const std::vector<RunErrors>& runs) {
@@ -201,10 +205,13 @@ nlohmann::json method_json(const PaperMethod& method, const std::vector<RunError
     runtime += run.runtime_s;
     diverged += run.worst_m > kDiverged_m ? 1 : 0;
   }
-  return {{"description", method.description}, {"sun", zone_json(runs, 0)},
-          {"shadow", zone_json(runs, 1)},      {"diverged", diverged},
+  return {{"description", method.description},
+          {"sun", zone_json(runs, 0)},
+          {"shadow", zone_json(runs, 1)},
+          {"diverged", diverged},
           {"cross_track_rmse_m", number(summarize(std::move(cross_track)).rmse)},
-          {"seeds", runs.size()},              {"cpu_s", runtime}};
+          {"seeds", runs.size()},
+          {"cpu_s", runtime}};
 }
 
 void write_curves(const fs::path& file, const std::vector<RunErrors>& runs, double interval_s) {

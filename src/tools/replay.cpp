@@ -66,7 +66,8 @@ YAML::Node merge_parameters(const Options& options) {
     } catch (const YAML::Exception& error) {
       throw std::runtime_error("--params " + file + ": " + error.what());
     }
-    if (!map.IsMap() && !map.IsNull()) throw std::runtime_error("--params " + file + ": must be a map of names to values");
+    if (!map.IsMap() && !map.IsNull())
+      throw std::runtime_error("--params " + file + ": must be a map of names to values");
     for (const char* section : {"gps_bias", "particle_filter"}) {
       if (!map.IsMap() || !map[section].IsDefined()) continue;
       merge(map[section]);
@@ -88,12 +89,10 @@ YAML::Node merge_parameters(const Options& options) {
 Parameters read_parameters(const Options& options) {
   Parameters parameters;
   ParameterReader reader(merge_parameters(options));
-  for (const char* live_only : {"particle_cloud_rate", "estimate_timeout", "diagnostic_period"}) reader.ignore(live_only);
-  const auto faults = reader.read(parameters.node)
-                          .read(parameters.filter)
-                          .read(parameters.motion)
-                          .read(parameters.bias)
-                          .finish();
+  for (const char* live_only : {"particle_cloud_rate", "estimate_timeout", "diagnostic_period"})
+    reader.ignore(live_only);
+  const auto faults =
+      reader.read(parameters.node).read(parameters.filter).read(parameters.motion).read(parameters.bias).finish();
   if (!faults.empty()) throw ParameterError("replay", faults);
   return parameters;
 }
@@ -117,9 +116,8 @@ std::vector<rosbag::MessageInstance> ordered_messages(const rosbag::Bag& bag, co
     const auto name = std::find(names.begin(), names.end(), without_slash(as_read[i].getTopic()));
     keys.push_back({as_read[i].getTime(), name - names.begin(), i});
   }
-  std::stable_sort(keys.begin(), keys.end(), [](const Key& a, const Key& b) {
-    return a.time != b.time ? a.time < b.time : a.rank < b.rank;
-  });
+  std::stable_sort(keys.begin(), keys.end(),
+                   [](const Key& a, const Key& b) { return a.time != b.time ? a.time < b.time : a.rank < b.rank; });
   std::vector<rosbag::MessageInstance> messages;
   messages.reserve(keys.size());
   for (const Key& key : keys) messages.push_back(as_read[key.index]);
@@ -187,8 +185,7 @@ class Replay {
     const LocalFrame theirs(*bag_datum_);
     Trajectory moved = truth_;
     for (TimedPose& timed : moved) {
-      const Eigen::Vector3d point =
-          pipeline_.frame()->to_local(theirs.to_geodetic({timed.pose.x, timed.pose.y, 0.0}));
+      const Eigen::Vector3d point = pipeline_.frame()->to_local(theirs.to_geodetic({timed.pose.x, timed.pose.y, 0.0}));
       timed.pose.x = point.x();
       timed.pose.y = point.y();
     }
@@ -221,14 +218,13 @@ class Replay {
       estimate_.push_back({output.stamp, output.estimate.pose, output.estimate.covariance});
       write(topics::kEstimate, output.stamp, to_message(output, parameters_.node.frames));
       tf2_msgs::TFMessage tf;
-      tf.transforms.push_back(
-          to_map_to_odom(output, parameters_.node.frames, parameters_.node.transform_time_offset));
+      tf.transforms.push_back(to_map_to_odom(output, parameters_.node.frames, parameters_.node.transform_time_offset));
       write("tf", output.stamp, tf);
     }
     for (const FixVerdict& verdict : pipeline_.take_verdicts()) {
       ++decisions_[to_string(verdict.decision)];
-      write("status", newest_, to_message(pipeline_.report(), pipeline_.localizer(), to_ros(newest_),
-                                          parameters_.node.frames.map));
+      write("status", newest_,
+            to_message(pipeline_.report(), pipeline_.localizer(), to_ros(newest_), parameters_.node.frames.map));
     }
   }
 
@@ -287,8 +283,8 @@ void run(const Options& options) {
     return std::count_if(messages.begin(), messages.end(),
                          [&](const auto& message) { return without_slash(message.getTopic()) == name; });
   };
-  for (const auto& [option, name] : {std::pair("--fix-topic", fix), std::pair("--odom-topic", odom),
-                                     std::pair("--imu-topic", imu)}) {
+  for (const auto& [option, name] :
+       {std::pair("--fix-topic", fix), std::pair("--odom-topic", odom), std::pair("--imu-topic", imu)}) {
     if (!name.empty() && count(name) == 0) {
       std::string present;
       rosbag::View all(bag);
@@ -364,7 +360,8 @@ int main(int argc, char** argv) {
   app.add_option("--odom-topic", options.odom_topic, "nav_msgs/Odometry");
   app.add_option("--imu-topic", options.imu_topic, "sensor_msgs/Imu whose yaw rate is used instead of the odometry's");
   app.add_option("--truth-topic", options.truth_topic, "nav_msgs/Odometry, for the errors only");
-  app.add_option("--datum", options.datum, "LAT,LON,ALT (deg, deg, m); default: the bag's gps/datum, or the first fixes")
+  app.add_option("--datum", options.datum,
+                 "LAT,LON,ALT (deg, deg, m); default: the bag's gps/datum, or the first fixes")
       ->delimiter(',')
       ->expected(3);
   app.add_option("--seed", options.seed, "seed of the random numbers; default: as in the parameters");

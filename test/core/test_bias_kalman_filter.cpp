@@ -256,7 +256,7 @@ TEST(BiasTracker, EveryParameterHasAnEffectF36) {
     return values;
   };
   const std::vector<std::string> changes = {
-      "bias_input: position",   "shadow_sigma: 2.0",  "bias_acceleration_density: 0.5", "bias_rate_sigma: 1.0",
+      "bias_input: position",  "shadow_sigma: 2.0", "bias_acceleration_density: 0.5", "bias_rate_sigma: 1.0",
       "gate_probability: 0.5", "gate_timeout: 2.0", "shadow_probability: 0.9"};
   for (const std::string& change : changes) EXPECT_NE(trace(with(GpsBiasParameters{}, change)), trace({})) << change;
   EXPECT_EQ(changes.size(), parameter_names(GpsBiasParameters{}).size());

@@ -241,8 +241,8 @@ TEST(BiasPipeline, EveryParameterHasAnEffectF36) {
       }
       if (k == 150) rig.pipeline.add_odometry({Rig::at(0.1 * k - 0.7), {}, {}});
       for (const BiasEstimate& e : rig.take()) {
-        out << k << ' ' << e.radius_m << ' ' << e.shadow_threshold << ' ' << int(e.verdict.decision)
-            << e.verdict.reason << '\n';
+        out << k << ' ' << e.radius_m << ' ' << e.shadow_threshold << ' ' << int(e.verdict.decision) << e.verdict.reason
+            << '\n';
       }
     }
     rig.drive(0.0);
@@ -250,12 +250,12 @@ TEST(BiasPipeline, EveryParameterHasAnEffectF36) {
     return out.str();
   };
   const std::map<std::string, std::string> changes = {
-      {"antenna_offset", "[1.0, 0.0]"},     {"estimate_timeout", "0.35"},    {"time_jump", "0.5"},
-      {"reset_on_time_jump", "false"},      {"fix_sigma_default", "7.0"},    {"fix_sigma_floor", "0.5"},
-      {"fix_sigma_ceiling", "100.0"},       {"fix_covariance_scale", "2.0"}, {"max_distance_from_datum", "1000.0"},
-      {"bias_input", "position"},           {"shadow_sigma", "2.0"},         {"bias_acceleration_density", "1.0"},
-      {"bias_rate_sigma", "1.0"},           {"gate_probability", "0.5"},     {"gate_timeout", "2.0"},
-      {"shadow_probability", "0.9"},        {"odometry_gap", "0.05"}};
+      {"antenna_offset", "[1.0, 0.0]"}, {"estimate_timeout", "0.35"},    {"time_jump", "0.5"},
+      {"reset_on_time_jump", "false"},  {"fix_sigma_default", "7.0"},    {"fix_sigma_floor", "0.5"},
+      {"fix_sigma_ceiling", "100.0"},   {"fix_covariance_scale", "2.0"}, {"max_distance_from_datum", "1000.0"},
+      {"bias_input", "position"},       {"shadow_sigma", "2.0"},         {"bias_acceleration_density", "1.0"},
+      {"bias_rate_sigma", "1.0"},       {"gate_probability", "0.5"},     {"gate_timeout", "2.0"},
+      {"shadow_probability", "0.9"},    {"odometry_gap", "0.05"}};
   const std::string plain = trace("{}");
   for (const std::string& name : parameter_names(BiasPipelineParameters{})) {
     ASSERT_EQ(changes.count(name), 1u) << name << " is not examined";

@@ -154,9 +154,9 @@ TEST(Config, DefaultsAreReadWithoutFault) {
                              MotionParameters())),
             kNoFault);
   EXPECT_EQ(joined(faults_in(values_of(load("gps_bias.yaml")), frames(), BiasPipelineParameters())), kNoFault);
-  EXPECT_EQ(joined(faults_in(values_of(load("waypoint_controller.yaml")), controller_node(),
-                             WaypointControllerParameters())),
-            kNoFault);
+  EXPECT_EQ(
+      joined(faults_in(values_of(load("waypoint_controller.yaml")), controller_node(), WaypointControllerParameters())),
+      kNoFault);
 }
 
 TEST(Config, PaperFieldIsReadWithoutFault) {
@@ -209,7 +209,8 @@ TEST(Config, RosparamReadsTheSameValues) {
       const YAML::Node list = value.IsSequence() ? value : YAML::Load("[" + text_of(value) + "]");
       for (const auto& element : list) {
         EXPECT_FALSE(std::regex_match(element.Scalar(), text_for_rosparam)) << name << ": " << key << " is a text";
-        EXPECT_FALSE(std::regex_match(element.Scalar(), boolean_for_rosparam)) << name << ": " << key << " is a boolean";
+        EXPECT_FALSE(std::regex_match(element.Scalar(), boolean_for_rosparam))
+            << name << ": " << key << " is a boolean";
       }
     }
   }

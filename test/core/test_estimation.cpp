@@ -145,8 +145,8 @@ TEST(Clusters, HeavierOfTwoBlobsIsTheEstimateF32) {
 }
 
 TEST(Clusters, ChainOfTouchingCellsIsOneInEveryDirection) {
-  for (const Eigen::Vector2d& step : {Eigen::Vector2d(1.0, 0.0), Eigen::Vector2d(0.0, -1.0), Eigen::Vector2d(1.0, 1.0),
-                                     Eigen::Vector2d(-1.0, 1.0)}) {
+  for (const Eigen::Vector2d& step :
+       {Eigen::Vector2d(1.0, 0.0), Eigen::Vector2d(0.0, -1.0), Eigen::Vector2d(1.0, 1.0), Eigen::Vector2d(-1.0, 1.0)}) {
     ParticleSet particles(100);
     for (std::size_t i = 0; i < 100; ++i) {
       particles.x[i] = 0.5 + step.x() * static_cast<double>(i);

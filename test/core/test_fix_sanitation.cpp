@@ -300,9 +300,28 @@ TEST(FixSanitation, ParametersMustBeInOrder) {
 }
 
 TEST(FixSanitation, NothingReceivedLeadsToANonFiniteResultF25) {
-  const double nasty[] = {0.0,   -0.0, 1.0,  -1.0,  90.0,  -180.0, 180.0, 33.89, 130.84, 1e-12,
-                          -1e-9, 25.0, 1e10, 1e155, -1e160, kMax,  -kMax, kNaN,  kInfinity, -kInfinity,
-                          std::numeric_limits<double>::min(), std::numeric_limits<double>::denorm_min()};
+  const double nasty[] = {0.0,
+                          -0.0,
+                          1.0,
+                          -1.0,
+                          90.0,
+                          -180.0,
+                          180.0,
+                          33.89,
+                          130.84,
+                          1e-12,
+                          -1e-9,
+                          25.0,
+                          1e10,
+                          1e155,
+                          -1e160,
+                          kMax,
+                          -kMax,
+                          kNaN,
+                          kInfinity,
+                          -kInfinity,
+                          std::numeric_limits<double>::min(),
+                          std::numeric_limits<double>::denorm_min()};
   const Stamp stamps[] = {Stamp::min(), Stamp(-1), Stamp(0), Stamp(1), from_seconds(100.0), Stamp::max()};
   std::mt19937_64 generator(20130917);
   const auto pick = [&](const auto& values) {

@@ -22,8 +22,7 @@ struct Drive {
 
   Pose2 odometry(int second) const {
     const double yaw = turn_rate * second;
-    return {speed / turn_rate * std::sin(yaw) + 40.0, speed / turn_rate * (1.0 - std::cos(yaw)) - 7.0,
-            wrap_angle(yaw)};
+    return {speed / turn_rate * std::sin(yaw) + 40.0, speed / turn_rate * (1.0 - std::cos(yaw)) - 7.0, wrap_angle(yaw)};
   }
   Pose2 truth(int second) const { return compose(map_from_odometry, odometry(second)); }
   LocalFix fix(int second, std::mt19937_64& generator) const {

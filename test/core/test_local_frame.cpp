@@ -14,11 +14,11 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 /// The datums that break projections and zones: each quadrant, the 180° meridian from both sides, poles, zone borders.
-const GeodeticPosition kDatums[] = {{33.89, 130.84, 30.0},  {-33.86, 151.21, 20.0}, {40.71, -74.01, 10.0},
-                                    {-22.91, -43.17, 5.0},  {-16.8, 179.99999, 0.0}, {-16.8, -179.99999, 0.0},
-                                    {-16.8, 180.0, 0.0},    {-16.8, -180.0, 0.0},    {0.0, 0.0, 0.0},
-                                    {89.9999, 45.0, 100.0}, {90.0, 0.0, 0.0},        {-90.0, 0.0, 2835.0},
-                                    {-89.9999, -120.0, 0.0}, {60.0, 6.0, 0.0},       {84.0, 12.0, -50.0}};
+const GeodeticPosition kDatums[] = {{33.89, 130.84, 30.0},   {-33.86, 151.21, 20.0},  {40.71, -74.01, 10.0},
+                                    {-22.91, -43.17, 5.0},   {-16.8, 179.99999, 0.0}, {-16.8, -179.99999, 0.0},
+                                    {-16.8, 180.0, 0.0},     {-16.8, -180.0, 0.0},    {0.0, 0.0, 0.0},
+                                    {89.9999, 45.0, 100.0},  {90.0, 0.0, 0.0},        {-90.0, 0.0, 2835.0},
+                                    {-89.9999, -120.0, 0.0}, {60.0, 6.0, 0.0},        {84.0, 12.0, -50.0}};
 
 double distance(const Eigen::Vector3d& a, const Eigen::Vector3d& b) { return (a - b).norm(); }
 
@@ -122,10 +122,10 @@ TEST(LocalFrame, DatumThatIsNoPlaceIsRefusedByName) {
 
 TEST(LocalFrame, WhatIsNoPlaceConvertsToNaNAndDoesNotThrow) {
   const LocalFrame frame({33.89, 130.84, 30.0});
-  for (const GeodeticPosition& position : {GeodeticPosition{kNaN, 0.0, 0.0}, GeodeticPosition{0.0, kNaN, 0.0},
-                                           GeodeticPosition{0.0, 0.0, kNaN}, GeodeticPosition{90.1, 0.0, 0.0},
-                                           GeodeticPosition{kInfinity, 0.0, 0.0}, GeodeticPosition{0.0, kInfinity, 0.0},
-                                           GeodeticPosition{0.0, 0.0, -kInfinity}}) {
+  for (const GeodeticPosition& position :
+       {GeodeticPosition{kNaN, 0.0, 0.0}, GeodeticPosition{0.0, kNaN, 0.0}, GeodeticPosition{0.0, 0.0, kNaN},
+        GeodeticPosition{90.1, 0.0, 0.0}, GeodeticPosition{kInfinity, 0.0, 0.0}, GeodeticPosition{0.0, kInfinity, 0.0},
+        GeodeticPosition{0.0, 0.0, -kInfinity}}) {
     EXPECT_TRUE(frame.to_local(position).array().isNaN().all());
   }
   for (const double value : {kNaN, kInfinity, -kInfinity}) {

@@ -81,9 +81,7 @@ struct Rig {
 
   static Stamp at(double time) { return from_seconds(1000.0 + time); }
   static Pose2 truth(double time) { return move({}, kTwist, time); }
-  static OdometrySample odometry(double time) {
-    return {at(time), compose({-7.0, 5.0, 1.0}, truth(time)), kTwist};
-  }
+  static OdometrySample odometry(double time) { return {at(time), compose({-7.0, 5.0, 1.0}, truth(time)), kTwist}; }
   void drive(double time) { pipeline.add_odometry(odometry(time)); }
   void fix(double time, const Eigen::Vector2d& error = {0.0, 0.0}, const Eigen::Vector2d& antenna = {0.0, 0.0}) {
     pipeline.add_fix(raw_fix(at(time), transform_point(truth(time), antenna) + error));

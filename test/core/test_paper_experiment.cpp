@@ -31,7 +31,7 @@ const PaperMethod& method(const std::string& name) {
 }
 
 struct Errors {
-  double sun{0.0};     ///< m, root mean square
+  double sun{0.0};  ///< m, root mean square
   double shadow{0.0};
   std::vector<Pose2> estimates;
   int steps_with_particles{0};

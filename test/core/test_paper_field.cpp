@@ -92,8 +92,9 @@ TEST(PaperField, NoiseDoesNotDependOnHowTheRobotIsSteered) {
   parameters.shadow_border = -1e6;
   MotionParameters motion;
   motion.motion_model = MotionModel::kBicycle;
-  motion = with(motion, "{odom_alpha1: 1e-4, odom_alpha2: 0, odom_alpha3: 0, odom_alpha4: 0, odom_alpha5: 0, "
-                        "odom_alpha6: 0}");
+  motion = with(motion,
+                "{odom_alpha1: 1e-4, odom_alpha2: 0, odom_alpha3: 0, odom_alpha4: 0, odom_alpha5: 0, "
+                "odom_alpha6: 0}");
   PaperField left(parameters, motion), right(parameters, motion);
   std::vector<double> speed_errors;
   for (int k = 0; k < 500; ++k) {

@@ -115,11 +115,11 @@ TEST(ParticleFilter, EveryParameterHasAnEffectF36) {
 
 TEST(ParticleFilter, EveryMotionParameterHasAnEffectF36) {
   const std::vector<std::pair<std::string, std::string>> changes = {
-      {"motion_model: bicycle", "{}"},  {"wheelbase: 2.0", "motion_model: bicycle"},
-      {"odom_alpha1: 0.002", "{}"},     {"odom_alpha2: 0.002", "{}"},
-      {"odom_alpha3: 0.002", "{}"},     {"odom_alpha4: 0.002", "{}"},
-      {"odom_alpha5: 0.002", "{}"},     {"odom_alpha6: 0.002", "{}"},
-      {"odom_noise_scale: 2.0", "{}"},  {"odom_noise_interval: 0.5", "{}"}};
+      {"motion_model: bicycle", "{}"}, {"wheelbase: 2.0", "motion_model: bicycle"},
+      {"odom_alpha1: 0.002", "{}"},    {"odom_alpha2: 0.002", "{}"},
+      {"odom_alpha3: 0.002", "{}"},    {"odom_alpha4: 0.002", "{}"},
+      {"odom_alpha5: 0.002", "{}"},    {"odom_alpha6: 0.002", "{}"},
+      {"odom_noise_scale: 2.0", "{}"}, {"odom_noise_interval: 0.5", "{}"}};
   EXPECT_EQ(changes.size(), parameter_names(MotionParameters{}).size());
   for (const auto& [change, base] : changes) {
     const MotionParameters motion = with(MotionParameters{}, base);
@@ -137,8 +137,8 @@ TEST(ParticleFilter, ParkedRobotWithGoodFixesStaysWhereItIs) {
     for (int k = 1; k <= 20; ++k) {
       filter.move({0.0, 0.0}, 1.0);
       const double east = 0.5 * draw_normal(noise), north = 0.5 * draw_normal(noise);
-      EXPECT_FALSE(is_rejected(
-          filter.correct(fix_at(k, truth.position() + Eigen::Vector2d(east, north), 0.5)).decision));
+      EXPECT_FALSE(
+          is_rejected(filter.correct(fix_at(k, truth.position() + Eigen::Vector2d(east, north), 0.5)).decision));
     }
     // Twenty fixes of 0.5 m leave 0.11 m; 4.5 of that, and the heading nothing but its start.
     EXPECT_LT((filter.pose().position() - truth.position()).norm(), 0.5) << mode;

@@ -102,8 +102,8 @@ TEST(RingSampler, DrawsRadiusAngleHeadingAndWeightOfEq23To26) {
   double largest = 0.0;
   for (std::size_t i = 0; i < angles.size(); ++i) {
     const double expected = (angles[i] + kPi) / (2.0 * kPi);
-    largest = std::max({largest, std::abs(expected - i / double(Ring::kCount)),
-                        std::abs(expected - (i + 1) / double(Ring::kCount))});
+    largest = std::max(
+        {largest, std::abs(expected - i / double(Ring::kCount)), std::abs(expected - (i + 1) / double(Ring::kCount))});
   }
   EXPECT_LT(largest, 1.95 / std::sqrt(double(Ring::kCount)));
 }

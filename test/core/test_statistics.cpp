@@ -1,11 +1,11 @@
-#include "urban_gnss_localization/evaluation/statistics.hpp"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 #include <random>
 #include <vector>
+
+#include "urban_gnss_localization/evaluation/statistics.hpp"
 
 namespace {
 

@@ -1,5 +1,3 @@
-#include "urban_gnss_localization/evaluation/trajectory_errors.hpp"
-
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
@@ -10,6 +8,7 @@
 #include <random>
 
 #include "urban_gnss_localization/evaluation/report_json.hpp"
+#include "urban_gnss_localization/evaluation/trajectory_errors.hpp"
 #include "urban_gnss_localization/geometry/angles.hpp"
 #include "urban_gnss_localization/geometry/pose2.hpp"
 
@@ -225,8 +224,8 @@ TrajectoryErrors gaussian_errors(int count, double scale) {
   for (int i = 0; i < count; ++i) {
     const Eigen::Vector3d error = factor * Eigen::Vector3d(normal(generator), normal(generator), normal(generator));
     truth.push_back(timed_pose(std::chrono::seconds(i), {3.0 * i, 0.0, kPi - 0.01}));
-    estimate.push_back(timed_pose(std::chrono::seconds(i), {3.0 * i + error.x(), error.y(),
-                                                            urban_gnss::wrap_angle(kPi - 0.01 + error.z())}));
+    estimate.push_back(timed_pose(std::chrono::seconds(i),
+                                  {3.0 * i + error.x(), error.y(), urban_gnss::wrap_angle(kPi - 0.01 + error.z())}));
     estimate.back().covariance = scale * covariance;
   }
   return errors_at_truth(truth, estimate);

@@ -1,5 +1,3 @@
-#include "urban_gnss_localization/evaluation/tum.hpp"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -10,6 +8,7 @@
 #include <string>
 
 #include "urban_gnss_localization/evaluation/stamp_text.hpp"
+#include "urban_gnss_localization/evaluation/tum.hpp"
 #include "urban_gnss_localization/geometry/angles.hpp"
 
 namespace {
@@ -121,7 +120,7 @@ TEST(Tum, ReadsBackWhatItWrote) {
 TEST(Tum, ReadsOthersFiles) {
   std::istringstream in(
       "# stamp tx ty tz qx qy qz qw\r\n\r\n"
-      "2.0 1 2 3 0 0 -2 2\r\n"                  // not normalised: a quarter turn clockwise
+      "2.0 1 2 3 0 0 -2 2\r\n"                                               // not normalised: a quarter turn clockwise
       "1.0 4 5 6 0.6532814824 0.2705980501 0.2705980501 0.6532814824\r\n");  // yaw 45°, then a roll of 90°
   const Trajectory trajectory = read_tum(in);
   ASSERT_EQ(trajectory.size(), 2u);

@@ -8,13 +8,13 @@
 namespace urban_gnss {
 
 struct WaypointControllerParameters {
-  double speed{1.0};             ///< m/s, constant, eq. (37)
-  double steering_gain{0.8};     ///< k_phi
-  double max_steering{1.2};      ///< rad
-  double wheelbase{1.0};         ///< m, turns the steering angle into the yaw rate of cmd_vel
-  double switch_distance{0.5};   ///< m, between the estimate and a target, at which the next target becomes current
-  int laps{0};                   ///< rounds over all targets after which it stops; 0 goes on for ever
-  std::vector<double> targets;   ///< m, x and y of each target in turn, map frame
+  double speed{1.0};            ///< m/s, constant, eq. (37)
+  double steering_gain{0.8};    ///< k_phi
+  double max_steering{1.2};     ///< rad
+  double wheelbase{1.0};        ///< m, turns the steering angle into the yaw rate of cmd_vel
+  double switch_distance{0.5};  ///< m, between the estimate and a target, at which the next target becomes current
+  int laps{0};                  ///< rounds over all targets after which it stops; 0 goes on for ever
+  std::vector<double> targets;  ///< m, x and y of each target in turn, map frame
 
   template <class V>
   void visit(V& v) {

@@ -15,8 +15,8 @@ namespace urban_gnss {
 /// Everything that the simulation of section 4 depends on.
 struct PaperExperimentConditions {
   PaperFieldParameters field;
-  MotionParameters field_motion;      ///< of the robot
-  MotionParameters filter_motion;     ///< that the filters assume
+  MotionParameters field_motion;   ///< of the robot
+  MotionParameters filter_motion;  ///< that the filters assume
   GpsBiasParameters bias;
   ParticleFilterParameters filter;
   WaypointControllerParameters controller;

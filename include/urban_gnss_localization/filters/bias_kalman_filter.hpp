@@ -69,13 +69,13 @@ struct GpsBiasParameters {
 /// The bias as it stands after a fix.
 struct BiasEstimate {
   Stamp stamp{0};
-  Eigen::Vector2d bias{Eigen::Vector2d::Zero()};          ///< m, fix minus antenna
-  Eigen::Vector2d rate{Eigen::Vector2d::Zero()};          ///< m/s
-  Eigen::Matrix2d covariance{Eigen::Matrix2d::Zero()};    ///< m^2
-  double radius_m{0.0};                                   ///< r-hat, eq. (21)
+  Eigen::Vector2d bias{Eigen::Vector2d::Zero()};        ///< m, fix minus antenna
+  Eigen::Vector2d rate{Eigen::Vector2d::Zero()};        ///< m/s
+  Eigen::Matrix2d covariance{Eigen::Matrix2d::Zero()};  ///< m^2
+  double radius_m{0.0};                                 ///< r-hat, eq. (21)
   bool in_shadow{false};
-  double shadow_statistic{0.0};  ///< squared Mahalanobis length of the bias
-  double shadow_threshold{0.0};  ///< its chi-square quantile
+  double shadow_statistic{0.0};                                         ///< squared Mahalanobis length of the bias
+  double shadow_threshold{0.0};                                         ///< its chi-square quantile
   Eigen::Vector2d fix_position{Eigen::Vector2d::Zero()};                ///< m, map frame
   Eigen::Vector2d predicted_antenna_position{Eigen::Vector2d::Zero()};  ///< m, what the fix was compared with
   FixVerdict verdict;

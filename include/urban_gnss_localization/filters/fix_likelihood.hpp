@@ -18,15 +18,15 @@ EnumNames<LikelihoodForm> enum_names(LikelihoodForm);
 /// One fix as the likelihood of a particle sees it.
 struct FixLikelihood {
   LikelihoodForm form{LikelihoodForm::kProduct};
-  bool with_shadow{true};    ///< eq. (33); false is eq. (47)
-  bool with_heading{false};  ///< the terms in d_theta
-  Eigen::Vector2d fix{Eigen::Vector2d::Zero()};                ///< m, map frame
-  Eigen::Vector2d antenna_in_body{Eigen::Vector2d::Zero()};    ///< m, antenna at the fix's stamp, from the base now
+  bool with_shadow{true};                                          ///< eq. (33); false is eq. (47)
+  bool with_heading{false};                                        ///< the terms in d_theta
+  Eigen::Vector2d fix{Eigen::Vector2d::Zero()};                    ///< m, map frame
+  Eigen::Vector2d antenna_in_body{Eigen::Vector2d::Zero()};        ///< m, antenna at the fix's stamp, from the base now
   Eigen::Matrix2d direct_covariance{Eigen::Matrix2d::Identity()};  ///< m^2, Sigma_b
-  double shadow_sigma{1.0};   ///< m, sigma_s
-  double heading_sigma{0.1};  ///< rad, sigma_p
-  double radius{0.0};         ///< m, r-hat
-  double fix_heading{0.0};    ///< rad, theta_GPS of eq. (12)
+  double shadow_sigma{1.0};                                        ///< m, sigma_s
+  double heading_sigma{0.1};                                       ///< rad, sigma_p
+  double radius{0.0};                                              ///< m, r-hat
+  double fix_heading{0.0};                                         ///< rad, theta_GPS of eq. (12)
 };
 
 /// Log of eq. (33) (or (47)) for one pose: the plain form, which `weigh` must agree with (a test compares them).

@@ -13,7 +13,7 @@ namespace urban_gnss {
 
 /// A fix at the moment it enters a filter.
 struct FixMeasurement {
-  Eigen::Vector2d position{Eigen::Vector2d::Zero()};  ///< m, map frame
+  Eigen::Vector2d position{Eigen::Vector2d::Zero()};        ///< m, map frame
   Eigen::Matrix2d covariance{Eigen::Matrix2d::Identity()};  ///< m^2
   /// Where the antenna was at the fix's stamp, seen from the base as it stands now (m): lever arm and lateness in one.
   Eigen::Vector2d antenna_in_body{Eigen::Vector2d::Zero()};

@@ -27,20 +27,20 @@ EnumNames<EstimateMethod> enum_names(EstimateMethod);
 
 struct ParticleFilterParameters {
   ParticleFilterMode mode{ParticleFilterMode::kPaper};
-  int particle_count{1000};                        ///< M
-  double ring_share{0.05};                         ///< share of particles drawn on the ring, eq. (22)
+  int particle_count{1000};                              ///< M
+  double ring_share{0.05};                               ///< share of particles drawn on the ring, eq. (22)
   LikelihoodChoice likelihood{LikelihoodChoice::kAuto};  ///< auto: printed (literal, conventional) or product (paper)
-  Switch use_gps_heading{Switch::kAuto};           ///< theta_GPS, eq. (12); auto: with the sums, not with the product
-  bool use_fix_covariance{true};                   ///< Sigma_b from each fix instead of direct_sigma
-  double direct_sigma{3.0};                        ///< m, sigma_b
-  double shadow_sigma{3.0};                        ///< m, sigma_s
-  double gps_heading_sigma{0.1};                   ///< rad, sigma_p
-  double ess_threshold{5.0};                       ///< resampling below this effective sample size, eq. (39)
+  Switch use_gps_heading{Switch::kAuto};  ///< theta_GPS, eq. (12); auto: with the sums, not with the product
+  bool use_fix_covariance{true};          ///< Sigma_b from each fix instead of direct_sigma
+  double direct_sigma{3.0};               ///< m, sigma_b
+  double shadow_sigma{3.0};               ///< m, sigma_s
+  double gps_heading_sigma{0.1};          ///< rad, sigma_p
+  double ess_threshold{5.0};              ///< resampling below this effective sample size, eq. (39)
   ResamplingScheme resampling{ResamplingScheme::kMultinomial};
   EstimateMethod estimate{EstimateMethod::kHeaviestCluster};
-  double cluster_cell{1.0};                        ///< m, particles within one to two cells belong together
-  double gate_probability{0.99};                   ///< conventional mode: gate on the NIS; 1 switches it off
-  double gate_timeout{5.0};                        ///< s of nothing but rejections after which it restarts on the fix
+  double cluster_cell{1.0};       ///< m, particles within one to two cells belong together
+  double gate_probability{0.99};  ///< conventional mode: gate on the NIS; 1 switches it off
+  double gate_timeout{5.0};       ///< s of nothing but rejections after which it restarts on the fix
   int seed{1};
 
   template <class V>

@@ -19,8 +19,8 @@ class RingSampler {
   /// `share` in [0, 1] of the particles.
   RingSampler(std::size_t particle_count, double share);
 
-  /// `predicted` is f(x_est, u) of eq. (23), `radius_m` r-hat, `radius_sigma_m` sigma_b, `weight_sigma_m` sigma_s. Each drawn particle takes the weight of eq. (26) in place
-  /// of its own: requires weights that are normalised before.
+  /// `predicted` is f(x_est, u) of eq. (23), `radius_m` r-hat, `radius_sigma_m` sigma_b, `weight_sigma_m` sigma_s. Each
+  /// drawn particle takes the weight of eq. (26) in place of its own: requires weights that are normalised before.
   void sample(ParticleSet& particles, const Pose2& predicted, double radius_m, double radius_sigma_m,
               double weight_sigma_m, RandomEngine& engine);
 

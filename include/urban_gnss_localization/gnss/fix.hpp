@@ -29,7 +29,7 @@ struct RawFix {
 /// A fix in the map frame that passed sanitation: finite, with a positive definite covariance.
 struct LocalFix {
   Stamp stamp{0};
-  Eigen::Vector2d position{Eigen::Vector2d::Zero()};      ///< east, north of the datum, m
+  Eigen::Vector2d position{Eigen::Vector2d::Zero()};        ///< east, north of the datum, m
   Eigen::Matrix2d covariance{Eigen::Matrix2d::Identity()};  ///< m^2
 };
 

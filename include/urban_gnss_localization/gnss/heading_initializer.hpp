@@ -34,7 +34,8 @@ struct HeadingInitializerParameters {
 /// the odometry on the fixes in the sense of least squares.
 ///
 /// 1. Every fix is remembered with the odometry's pose at the fix's own stamp, for `initialization_window`.
-/// 2. A Cauchy-weighted alignment, whose scale is the median residual, tells which fixes agree with each other; one that
+/// 2. A Cauchy-weighted alignment, whose scale is the median residual, tells which fixes agree with each other; one
+/// that
 ///    is a kilometre off has no say.
 /// 3. The alignment is repeated over the fixes that agree, each weighted by 1 / its declared variance per axis.
 /// 4. With s² the larger of the declared and the residual variance per axis, the yaw's variance is s² / (sum of squared

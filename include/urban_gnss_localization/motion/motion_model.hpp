@@ -72,11 +72,11 @@ struct MotionParameters {
 
 /// One step of odometry with the standard deviations of its noise: what the noisy motion of eq. (8) needs.
 struct MotionStep {
-  Twist2 twist;            ///< noise-free, constant over the step
+  Twist2 twist;  ///< noise-free, constant over the step
   double duration_s{0.0};
   MotionModel model{MotionModel::kVelocity};
   double wheelbase_m{1.0};
-  double steering_rad{0.0};  ///< for kBicycle
+  double steering_rad{0.0};    ///< for kBicycle
   double speed_sigma{0.0};     ///< m/s
   double input_sigma{0.0};     ///< rad (kBicycle: steering) or rad/s (kVelocity: yaw rate)
   double yaw_rate_sigma{0.0};  ///< rad/s, the disturbance of eq. (7)

@@ -17,21 +17,21 @@
 namespace urban_gnss {
 
 struct LocalizationParameters {
-  std::vector<double> initial_pose;        ///< m, m, rad in the map frame; empty: from fixes and motion
-  double initial_position_sigma{1.0};      ///< m, of initial_pose
-  double initial_heading_sigma{0.2};       ///< rad, of initial_pose
+  std::vector<double> initial_pose;              ///< m, m, rad in the map frame; empty: from fixes and motion
+  double initial_position_sigma{1.0};            ///< m, of initial_pose
+  double initial_heading_sigma{0.2};             ///< rad, of initial_pose
   std::vector<double> antenna_offset{0.0, 0.0};  ///< m, x and y of the antenna in the base frame
-  bool use_imu_yaw_rate{false};            ///< the IMU's yaw rate in place of the odometry's, where there is one
-  double odometry_gap{2.0};                ///< s without odometry after which the robot's place is unknown
+  bool use_imu_yaw_rate{false};                  ///< the IMU's yaw rate in place of the odometry's, where there is one
+  double odometry_gap{2.0};                      ///< s without odometry after which the robot's place is unknown
   /// m, beyond three declared standard deviations: a fix farther from the estimate cannot be explained by reflections
   /// (Nishida et al., Japanese text: the distance does not vary by more than some tens of metres)
   double max_bias_radius{50.0};
-  double lost_timeout{10.0};               ///< s of nothing but such fixes after which the estimate is what is wrong
-  double fix_timeout{10.0};                ///< s without a fix that was used after which this is dead reckoning
-  double bias_timeout{0.5};                ///< s that a fix waits for its gps/bias
-  double time_jump{1.0};                   ///< s, a stamp older by more than this is a clock that was set back
+  double lost_timeout{10.0};  ///< s of nothing but such fixes after which the estimate is what is wrong
+  double fix_timeout{10.0};   ///< s without a fix that was used after which this is dead reckoning
+  double bias_timeout{0.5};   ///< s that a fix waits for its gps/bias
+  double time_jump{1.0};      ///< s, a stamp older by more than this is a clock that was set back
   bool reset_on_time_jump{true};
-  double heading_converged_sigma{0.3};     ///< rad, heading is said to be known below this
+  double heading_converged_sigma{0.3};  ///< rad, heading is said to be known below this
   DatumParameters datum;
   FixSanitationParameters fix;
   HeadingInitializerParameters heading;

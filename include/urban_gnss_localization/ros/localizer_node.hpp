@@ -47,12 +47,12 @@ struct LocalizerNodeParameters {
   }
 };
 
-/// The shell of every localizer: topics, services, tf, status and diagnostics around a LocalizationPipeline. A localizer
-/// node makes its filter, hands it over and, where it has more to show, publishes that in `on_output`.
+/// The shell of every localizer: topics, services, tf, status and diagnostics around a LocalizationPipeline. A
+/// localizer node makes its filter, hands it over and, where it has more to show, publishes that in `on_output`.
 ///
 /// Subscribes odom, gps/fix, initialpose, gps/datum; gps/bias where the filter wants it; imu/data where
-/// use_imu_yaw_rate is set. Publishes odometry/filtered, tf map -> odom, ~status, and gps/datum (latched) where it found
-/// the datum itself. Services set_pose, datum, toLL, fromLL, ~reset.
+/// use_imu_yaw_rate is set. Publishes odometry/filtered, tf map -> odom, ~status, and gps/datum (latched) where it
+/// found the datum itself. Services set_pose, datum, toLL, fromLL, ~reset.
 class LocalizerNode {
  public:
   using OutputHook = std::function<void(const LocalizationOutput&)>;
@@ -69,7 +69,8 @@ class LocalizerNode {
   void on_bias(const urban_gnss_localization::GpsBias& message);
   void on_initial_pose(const geometry_msgs::PoseWithCovarianceStamped& message);
   void on_datum(const sensor_msgs::NavSatFix& message);
-  bool set_pose(urban_gnss_localization::SetPose::Request& request, urban_gnss_localization::SetPose::Response& response);
+  bool set_pose(urban_gnss_localization::SetPose::Request& request,
+                urban_gnss_localization::SetPose::Response& response);
   bool set_datum(urban_gnss_localization::SetDatum::Request& request,
                  urban_gnss_localization::SetDatum::Response& response);
   bool to_ll(urban_gnss_localization::ToLL::Request& request, urban_gnss_localization::ToLL::Response& response);

@@ -11,7 +11,8 @@
 namespace urban_gnss {
 
 /// The ring of radius r-hat about the predicted antenna (where the fix may lie in the shadow), orange in the shadow and
-/// green otherwise; the bias as an arrow from there; and the fix itself as a ball, yellow, or red where it was rejected.
+/// green otherwise; the bias as an arrow from there; and the fix itself as a ball, yellow, or red where it was
+/// rejected.
 visualization_msgs::MarkerArray bias_markers(const BiasEstimate& bias, const std::string& map_frame);
 
 /// The targets as numbered discs, the current one highlighted.

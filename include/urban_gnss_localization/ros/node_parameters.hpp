@@ -9,7 +9,8 @@
 
 namespace urban_gnss {
 
-/// The node's private parameters as one YAML map, so that nodes and offline tools read the same structs in the same way.
+/// The node's private parameters as one YAML map, so that nodes and offline tools read the same structs in the same
+/// way.
 YAML::Node private_parameters(const ros::NodeHandle& private_node);
 
 /// Reads structs out of the node's private parameters. Throws ParameterError with every fault of all of them.

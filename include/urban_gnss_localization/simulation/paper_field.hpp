@@ -20,12 +20,12 @@ EnumNames<BiasDirection> enum_names(BiasDirection);
 /// The field of Nishida et al., section 4.1.
 struct PaperFieldParameters {
   int target_count{8};
-  double target_ring_radius{15.0};  ///< m; the figure with the coordinates is lost
-  double interval{0.01};            ///< s, Delta: one motion step and one fix
-  double shadow_border{0.0};        ///< m, the shadow is where x is less
-  double fix_direct_sigma{0.05};    ///< m, sigma_b
+  double target_ring_radius{15.0};               ///< m; the figure with the coordinates is lost
+  double interval{0.01};                         ///< s, Delta: one motion step and one fix
+  double shadow_border{0.0};                     ///< m, the shadow is where x is less
+  double fix_direct_sigma{0.05};                 ///< m, sigma_b
   double fix_shadow_sigma{0.31622776601683794};  ///< m, sigma_s
-  double bias_limit{5.0};           ///< m, eq. (44)
+  double bias_limit{5.0};                        ///< m, eq. (44)
   BiasDirection bias_direction{BiasDirection::kRandom};
   double start_position_sigma{0.05};  ///< m, of what a localizer is told about the start
   double start_heading_sigma{0.05};   ///< rad
