@@ -29,14 +29,23 @@ PoseEstimate start_estimate(const PaperFieldParameters& field) {
   return start;
 }
 
+constexpr std::uint64_t kStartStream = 201;
+
 /// The estimator of one run: any of the methods behind the two calls that the loop makes.
 class Estimator {
  public:
   Estimator(PaperMethod::Kind kind, const PaperExperimentConditions& conditions)
-      : kind_(kind), field_(conditions.field), bias_(conditions.bias), dead_reckoned_(conditions.field.start()) {
-    if (kind_ != PaperMethod::Kind::kDeadReckoning) {
+      : kind_(kind), field_(conditions.field), bias_(conditions.bias) {
+    const PoseEstimate start = start_estimate(conditions.field);
+    if (kind_ == PaperMethod::Kind::kDeadReckoning) {
+      // As uncertain of its start as one particle.
+      RandomEngine engine = make_engine(static_cast<std::uint64_t>(conditions.field.seed), kStartStream);
+      ParticleSet single(1);
+      single.draw_gaussian(start, engine);
+      dead_reckoned_ = single.pose(0);
+    } else {
       filter_ = std::make_unique<ParticleFilter>(conditions.filter, conditions.filter_motion);
-      filter_->initialize(start_estimate(conditions.field));
+      filter_->initialize(start);
     }
   }
 

@@ -36,7 +36,7 @@ PaperExperimentConditions read_paper_conditions(const PaperFiles& files);
 struct PaperMethod {
   enum class Kind {
     kFilter,
-    kDeadReckoning,  ///< the inputs alone
+    kDeadReckoning,  ///< the inputs alone, from a start as uncertain as one particle's
     kOracleZone,     ///< knows the zone: drops the fix in the shadow
     kOracle,         ///< knows zone and bias: takes the bias off and uses the right noise
   };
