@@ -1,0 +1,181 @@
+"""The command-line programs end to end: the experiment, and a folder of CSV files through csv_to_bag, replay and evaluate.
+
+URBAN_GNSS_PROGRAMS names the folder of the programs. Real recordings are taken from URBAN_GNSS_DATA; without it those
+tests are skipped."""
+import csv
+import filecmp
+import json
+import math
+import os
+import subprocess
+import tempfile
+import unittest
+
+PROGRAMS = os.environ.get("URBAN_GNSS_PROGRAMS", "")
+PACKAGE = os.path.realpath(os.path.join(os.path.dirname(os.path.realpath(__file__)), "..", ".."))
+DATA = os.environ.get("URBAN_GNSS_DATA", os.path.join(PACKAGE, "..", "shared", "data"))
+ZONE_KEYS = {"position_rmse_m", "position_p95_m", "position_max_m", "heading_rmse_rad"}
+METRES_A_DEGREE = 111194.0  # of latitude, at 45 degrees; good to a part in a thousand
+
+
+def run(program, *arguments):
+    environment = dict(os.environ)
+    environment["ROS_PACKAGE_PATH"] = PACKAGE + ":" + environment.get("ROS_PACKAGE_PATH", "")
+    return subprocess.run([os.path.join(PROGRAMS, program), *map(str, arguments)], stdout=subprocess.PIPE,
+                          stderr=subprocess.STDOUT, universal_newlines=True, env=environment, timeout=300)
+
+
+def write_csv(path, header, rows):
+    with open(path, "w", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(header.split(","))
+        writer.writerows(rows)
+
+
+def write_recording(folder):
+    """A minute on a circle of 30 m at 3 m/s, with fixes whose error alternates by 1 m, and a tunnel of 10 s."""
+    latitude, longitude = 45.0, 7.0
+    stretch = math.cos(math.radians(latitude))
+    truth, odom, gnss = [], [], []
+    for k in range(601):
+        t = k / 10
+        angle = 0.1 * t
+        x, y = 30.0 * math.sin(angle), 30.0 - 30.0 * math.cos(angle)
+        stamp = "%.3f" % (5000.0 + t)
+        odom.append([stamp, 3.0, 0.1])
+        if k % 10 == 0:
+            truth.append([stamp, x, y, 0.0, angle, 3.0])
+            if not 300 < k < 400:
+                error = 1.0 if k % 20 == 0 else -1.0
+                gnss.append([stamp, latitude + (y + error) / METRES_A_DEGREE,
+                             longitude + (x - error) / METRES_A_DEGREE / stretch, 0.0, "", "", "",
+                             1.0, 0.0, 1.0, 4.0, 8, 1.0, 1.5])
+    write_csv(os.path.join(folder, "odom.csv"), "stamp,v,yaw_rate", odom)
+    write_csv(os.path.join(folder, "truth.csv"), "stamp,x,y,z,yaw,v", truth)
+    write_csv(os.path.join(folder, "gnss.csv"),
+              "stamp,lat_deg,lon_deg,alt_m,x,y,z,cov_xx,cov_xy,cov_yy,cov_zz,nsat,hdop,vdop", gnss)
+    with open(os.path.join(folder, "meta.json"), "w") as file:
+        json.dump({"origin": {"lat_deg": latitude, "lon_deg": longitude, "ellipsoid_height_m": 0.0}}, file)
+
+
+@unittest.skipUnless(PROGRAMS, "URBAN_GNSS_PROGRAMS is not set")
+class ToolTest(unittest.TestCase):
+    def setUp(self):
+        scratch = tempfile.TemporaryDirectory()
+        self.addCleanup(scratch.cleanup)
+        self.directory = scratch.name
+
+    def path(self, *names):
+        return os.path.join(self.directory, *names)
+
+    def succeed(self, program, *arguments):
+        done = run(program, *arguments)
+        self.assertEqual(done.returncode, 0, done.stdout)
+        return done.stdout
+
+    def refuse(self, program, *arguments):
+        done = run(program, *arguments)
+        self.assertNotEqual(done.returncode, 0, done.stdout)
+        return done.stdout
+
+    def test_paper_experiment(self):
+        self.succeed("paper_experiment", "--seeds", 2, "--laps", 1, "--noise-scale", 1e-6, "--bias-direction",
+                     "negative_x", "--methods", "paper,oracle", "--json", self.path("m.json"), "--plots",
+                     self.path("plots"))
+        with open(self.path("m.json")) as file:
+            methods = json.load(file)["methods"]
+        self.assertEqual(set(methods), {"paper", "oracle"})
+        for method in methods.values():
+            self.assertEqual(method["seeds"], 2)
+            self.assertLessEqual({"sun", "shadow", "diverged", "cross_track_rmse_m"}, set(method))
+            for zone in ("sun", "shadow"):
+                self.assertLessEqual(ZONE_KEYS, set(method[zone]))
+        self.assertLess(methods["oracle"]["shadow"]["position_rmse_m"], 0.15)
+        for name in ("fig7_particles.png", "fig8_trajectories.png", "fig9_errors.png", "report.html"):
+            self.assertTrue(os.path.getsize(self.path("plots", name)) > 0, name)
+
+    def test_paper_experiment_does_not_depend_on_threads(self):
+        for jobs in (1, 3):
+            self.succeed("paper_experiment", "--seeds", 3, "--laps", 1, "--methods", "paper", "--jobs", jobs, "--json",
+                         self.path("%d.json" % jobs))
+        results = []
+        for jobs in (1, 3):
+            with open(self.path("%d.json" % jobs)) as file:
+                method = json.load(file)["methods"]["paper"]
+            del method["cpu_s"]
+            results.append(method)
+        self.assertEqual(*results)
+
+    def test_paper_experiment_refuses(self):
+        self.assertIn("no such method", self.refuse("paper_experiment", "--methods", "papers"))
+        output = self.refuse("paper_experiment", "--set", "particle_filter.ring_share=2", "--set",
+                             "gps_bias.shadow_sigm=1")
+        self.assertIn("particle_filter.ring_share = 2", output)
+        self.assertIn("did you mean shadow_sigma?", output)
+
+    def test_recording_through_all_tools(self):
+        write_recording(self.directory)
+        self.succeed("csv_to_bag", self.directory, self.path("in.bag"))
+        for name in ("a", "b"):
+            self.succeed("replay", self.path("in.bag"), "--output", self.path(name + ".bag"), "--tum",
+                         self.path(name + ".tum"), "--json", self.path(name + ".json"), "--seed", 5)
+        for kind in (".bag", ".tum", ".json"):  # F26
+            self.assertTrue(filecmp.cmp(self.path("a" + kind), self.path("b" + kind), shallow=False), kind)
+        self.succeed("replay", self.path("in.bag"), "--tum", self.path("c.tum"), "--seed", 6)
+        self.assertFalse(filecmp.cmp(self.path("a.tum"), self.path("c.tum"), shallow=False))
+
+        with open(self.path("a.json")) as file:
+            metrics = json.load(file)
+        self.assertLess(metrics["errors"]["position_m"]["max"], 10.0)
+        self.succeed("evaluate", self.path("a.bag"), "--truth", self.path("in.bag"), "--output", self.path("report"))
+        with open(self.path("report", "metrics.json")) as file:
+            run_metrics = json.load(file)["runs"]["a/odometry/filtered"]
+        self.assertAlmostEqual(run_metrics["position_m"]["rmse"], metrics["errors"]["position_m"]["rmse"], places=3)
+        self.assertTrue(os.path.exists(self.path("report", "report.html")))
+
+        # About another datum the same places have other coordinates; the errors stay.
+        self.succeed("replay", self.path("in.bag"), "--datum", "45.001,6.999,0", "--json", self.path("d.json"), "--tum",
+                     self.path("d.tum"), "--seed", 5)
+        with open(self.path("d.json")) as file:
+            self.assertLess(json.load(file)["errors"]["position_m"]["max"], 10.0)
+        first, other = (open(self.path(name)).readlines()[-1].split() for name in ("a.tum", "d.tum"))
+        self.assertAlmostEqual(float(first[2]) - float(other[2]), 111.2, delta=5.0)
+
+    def test_replay_refuses(self):
+        write_recording(self.directory)
+        self.succeed("csv_to_bag", self.directory, self.path("in.bag"))
+        self.assertIn("/odom (nav_msgs/Odometry)", self.refuse("replay", self.path("in.bag"), "--fix-topic", "fix"))
+        self.assertIn("no such localizer", self.refuse("replay", self.path("in.bag"), "--localizer", "magic"))
+        self.assertIn("no such bag", self.refuse("replay", self.path("absent.bag")))
+        output = self.refuse("replay", self.path("in.bag"), "--set", "particle_count=0", "--set", "ring_shar=0.1")
+        self.assertIn("particle_count = 0", output)
+        self.assertIn("did you mean ring_share?", output)
+        self.assertIn("must be sensor_msgs/NavSatFix", self.refuse("replay", self.path("in.bag"), "--fix-topic", "tf"))
+
+    def test_csv_to_bag_refuses(self):
+        write_recording(self.directory)
+        with open(self.path("odom.csv"), "a") as file:
+            file.write("5060.1,fast,0.1\n")
+        output = self.refuse("csv_to_bag", self.directory, self.path("in.bag"))
+        self.assertIn("odom.csv", output)
+        self.assertIn("603", output)
+        os.remove(self.path("gnss.csv"))
+        self.assertIn("gnss.csv", self.refuse("csv_to_bag", self.directory, self.path("in.bag")))
+
+    def test_real_recordings_run_through(self):
+        for name in ("hk_tst_20210517_ublox", "nagoya_20230711"):
+            folder = os.path.join(DATA, name)
+            if not os.path.isdir(folder):
+                self.skipTest("no folder " + folder)
+            with self.subTest(recording=name):
+                self.succeed("csv_to_bag", folder, self.path("in.bag"))
+                self.succeed("replay", self.path("in.bag"), "--tum", self.path("out.tum"), "--json", self.path("out.json"))
+                with open(self.path("out.json")) as file:
+                    metrics = json.load(file)
+                self.assertGreater(metrics["errors"]["coverage"], 0.9)
+                with open(self.path("out.tum")) as file:
+                    self.assertTrue(all(math.isfinite(float(value)) for line in file for value in line.split()))
+
+
+if __name__ == "__main__":
+    unittest.main()
