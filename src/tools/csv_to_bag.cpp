@@ -24,6 +24,7 @@
 #include <string>
 #include <vector>
 
+#include "bag_contents.hpp"
 #include "csv_table.hpp"
 #include "urban_gnss_localization/geometry/angles.hpp"
 #include "urban_gnss_localization/geometry/local_frame.hpp"
@@ -35,6 +36,7 @@
 namespace {
 
 namespace fs = std::filesystem;
+using urban_gnss::BagContents;
 using urban_gnss::CsvTable;
 using urban_gnss::GeodeticPosition;
 using urban_gnss::LocalFrame;
@@ -46,73 +48,6 @@ struct OdometryNoise {
   double speed_mps{0.05};
   double speed_share{0.02};  ///< grows with the speed: wheel radius, slip
   double yaw_rate_rad_s{0.01};
-};
-
-/// As urban_gnss::to_ros, but what does not fit is an error of the file.
-ros::Time to_ros(Stamp stamp) {
-  const ros::Time time = urban_gnss::to_ros(stamp);
-  if (stamp <= Stamp(0) || urban_gnss::to_stamp(time) != stamp) {
-    throw std::runtime_error("stamp " + urban_gnss::format_stamp(stamp) + " s does not fit a ROS time");
-  }
-  return time;
-}
-
-/// Messages of many topics on their way into one bag.
-class BagContents {
- public:
-  template <class Message>
-  void add(const std::string& topic, Stamp stamp, const Message& message) {
-    auto shared = std::make_shared<const Message>(message);
-    entries_.push_back(
-        {stamp, [topic, shared](rosbag::Bag& bag, Stamp time) { bag.write(topic, to_ros(time), *shared); }});
-    const auto known = std::find_if(topics_.begin(), topics_.end(), [&](const Topic& t) { return t.name == topic; });
-    if (known == topics_.end()) {
-      topics_.push_back({topic, 1, stamp, stamp});
-    } else {
-      ++known->count;
-      known->first = std::min(known->first, stamp);
-      known->last = std::max(known->last, stamp);
-    }
-  }
-
-  /// Messages of one stamp are written in the order in which they were added, each a nanosecond after the one before
-  /// it: who reads a bag gets messages of equal times in an order that rosbag does not define. Only the bag's times
-  /// are moved, not the messages' own stamps.
-  void write(const fs::path& path) {
-    std::stable_sort(entries_.begin(), entries_.end(),
-                     [](const Entry& a, const Entry& b) { return a.stamp < b.stamp; });
-    rosbag::Bag bag(path.string(), rosbag::bagmode::Write);
-    Stamp last(0);
-    for (const Entry& entry : entries_) {
-      last = std::max(entry.stamp, last + Stamp(1));
-      entry.write(bag, last);
-    }
-    bag.close();
-  }
-
-  void print_summary(std::ostream& out) const {
-    out << std::left << std::setw(24) << "topic" << std::right << std::setw(9) << "messages" << std::setw(18)
-        << "from, s" << std::setw(18) << "to, s" << '\n';
-    out << std::fixed << std::setprecision(3);
-    for (const Topic& topic : topics_) {
-      out << std::left << std::setw(24) << topic.name << std::right << std::setw(9) << topic.count << std::setw(18)
-          << urban_gnss::to_seconds(topic.first) << std::setw(18) << urban_gnss::to_seconds(topic.last) << '\n';
-    }
-  }
-
- private:
-  struct Entry {
-    Stamp stamp;
-    std::function<void(rosbag::Bag&, Stamp)> write;
-  };
-  struct Topic {
-    std::string name;
-    std::size_t count;
-    Stamp first;
-    Stamp last;
-  };
-  std::vector<Entry> entries_;
-  std::vector<Topic> topics_;
 };
 
 CsvTable read_table(const fs::path& path) {
@@ -158,7 +93,7 @@ void add_odometry(const CsvTable& table, const OdometryNoise& noise, BagContents
       }
     }
     nav_msgs::Odometry odometry;
-    odometry.header.stamp = to_ros(table.stamp(row));
+    odometry.header.stamp = urban_gnss::to_ros_or_throw(table.stamp(row));
     odometry.header.frame_id = "odom";
     odometry.child_frame_id = "base_link";
     odometry.pose.pose = urban_gnss::to_message(pose);
@@ -201,7 +136,7 @@ void add_fixes(const CsvTable& table, const LocalFrame& frame, BagContents& cont
     const GeodeticPosition position{table.number(row, latitude), table.number(row, longitude),
                                     table.optional_number(row, altitude)};
     if (std::abs(position.latitude_deg) > 90.0) throw table.error(row, latitude, "is no latitude");
-    auto fix = urban_gnss::to_message(position, to_ros(table.stamp(row)), "gps");
+    auto fix = urban_gnss::to_message(position, urban_gnss::to_ros_or_throw(table.stamp(row)), "gps");
     const double variances[] = {table.optional_number(row, xx), table.optional_number(row, xy),
                                 table.optional_number(row, yy), table.optional_number(row, zz)};
     if (std::all_of(std::begin(variances), std::end(variances), [](double v) { return std::isfinite(v); })) {
@@ -268,7 +203,7 @@ void add_satellites(const CsvTable& table, BagContents& contents) {
   for (std::size_t row = 0; row < table.size();) {
     const Stamp stamp = table.stamp(row);
     urban_gnss_localization::SatelliteArray array;
-    array.header.stamp = to_ros(stamp);
+    array.header.stamp = urban_gnss::to_ros_or_throw(stamp);
     array.header.frame_id = "gps";
     array.angle_resolution = static_cast<float>(resolution);
     for (; row < table.size() && table.stamp(row) == stamp; ++row) {
@@ -304,7 +239,7 @@ void add_velocities(const CsvTable& table, BagContents& contents) {
   const auto up = table.optional_column("vu");
   for (std::size_t row = 0; row < table.size(); ++row) {
     geometry_msgs::TwistWithCovarianceStamped velocity;
-    velocity.header.stamp = to_ros(table.stamp(row));
+    velocity.header.stamp = urban_gnss::to_ros_or_throw(table.stamp(row));
     velocity.header.frame_id = "map";  // a vector is expressed in its frame_id, and these axes are east, north, up
     velocity.twist.twist.linear.x = table.number(row, east);
     velocity.twist.twist.linear.y = table.number(row, north);
@@ -326,7 +261,7 @@ void add_imu(const CsvTable& table, BagContents& contents) {
   const auto orientation = has_orientation ? columns({"qx", "qy", "qz", "qw"}) : std::vector<CsvTable::Column>{};
   for (std::size_t row = 0; row < table.size(); ++row) {
     sensor_msgs::Imu imu;
-    imu.header.stamp = to_ros(table.stamp(row));
+    imu.header.stamp = urban_gnss::to_ros_or_throw(table.stamp(row));
     imu.header.frame_id = "imu_link";
     imu.angular_velocity.x = table.number(row, rate[0]);
     imu.angular_velocity.y = table.number(row, rate[1]);
@@ -356,7 +291,7 @@ void add_truth(const CsvTable& table, BagContents& contents) {
   const auto or_zero = [](double value) { return std::isfinite(value) ? value : 0.0; };
   for (std::size_t row = 0; row < table.size(); ++row) {
     nav_msgs::Odometry truth;
-    truth.header.stamp = to_ros(table.stamp(row));
+    truth.header.stamp = urban_gnss::to_ros_or_throw(table.stamp(row));
     truth.header.frame_id = "map";
     truth.child_frame_id = "base_link";
     truth.pose.pose = urban_gnss::to_message(Pose2{table.number(row, x), table.number(row, y), table.number(row, yaw)});
@@ -389,7 +324,7 @@ void convert(const fs::path& folder, const std::string& gnss_file, const Odometr
 
   // The order of these calls is the order of messages with the same stamp: whatever a fix is compared with comes first.
   BagContents contents;
-  contents.add("/gps/datum", start, urban_gnss::to_message(origin, to_ros(start), "map"));
+  contents.add("/gps/datum", start, urban_gnss::to_message(origin, urban_gnss::to_ros_or_throw(start), "map"));
   add_odometry(odometry, noise, contents);
   add_fixes(fixes, LocalFrame(origin), contents);
   for (const auto& [table, add] : optional_tables) add(table, contents);
