@@ -120,8 +120,8 @@ def figure7_legend(figure):
 
 
 def plot_figure7(path, snapshots, particles):
-    """Particles around the true state at a few instants: one row per method, one column per instant."""
-    methods = [method for method in snapshots if method in particles]
+    """Particles around the true state at a few instants: a row for each of four methods, a column per instant."""
+    methods = choose_panels([method for method in snapshots if method in particles])
     if not methods:
         return False
     columns = max(len(snapshots[method]) for method in methods)
@@ -406,11 +406,17 @@ def introduction(metrics):
     return " ".join(parts)
 
 
+def in_order(methods, order):
+    """The methods in the order in which they were asked for, where the metrics say it."""
+    known = [name for name in order or [] if name in methods]
+    return {name: methods[name] for name in known + [name for name in methods if name not in known]}
+
+
 def make_report(directory):
     """Make all figures and the page; gives the path of the page."""
     metrics_path = os.path.join(directory, "metrics.json")
     metrics = common.read_json(metrics_path)
-    methods = common.require_object(metrics, "methods", metrics_path)
+    methods = in_order(common.require_object(metrics, "methods", metrics_path), metrics.get("method_order"))
     targets = common.read_csv(os.path.join(directory, "data", "targets.csv"), TARGET_COLUMNS)
     if not len(targets):
         raise common.ReportError("{}: no rows".format(os.path.join(directory, "data", "targets.csv")))
