@@ -50,9 +50,6 @@ void LocalizationPipeline::reset(const std::string& why) {
   forget_start();
   history_.clear();
   ++epoch_;
-  odometry_stamps_.reset();
-  fix_stamps_.reset();
-  imu_stamps_.reset();
   last_odometry_.reset();
   imu_yaw_rates_.clear();
   before_datum_.clear();
@@ -82,12 +79,16 @@ void LocalizationPipeline::reset(const std::string& why) {
   }
 }
 
-bool LocalizationPipeline::jumped(StampMonitor& monitor, Stamp stamp, const char* stream) {
+bool LocalizationPipeline::is_new(StampMonitor& monitor, Stamp stamp, const char* stream) {
   const auto last = monitor.last();
-  if (monitor.observe(stamp) != StampMonitor::Order::kJumpedBack) return false;
+  switch (monitor.observe(stamp)) {
+    case StampMonitor::Order::kNewer: return true;
+    case StampMonitor::Order::kNotNewer: return false;
+    case StampMonitor::Order::kJumpedBack: break;
+  }
   if (!parameters_.reset_on_time_jump) return false;
   reset(std::string("the clock of the ") + stream + " jumped back by " + seconds_text(to_seconds(*last - stamp)));
-  last_output_.reset();
+  for (StampMonitor* each : {&odometry_stamps_, &fix_stamps_, &imu_stamps_}) each->reset();
   monitor.observe(stamp);
   return true;
 }
@@ -96,8 +97,7 @@ void LocalizationPipeline::add_imu_yaw_rate(Stamp stamp, double yaw_rate_radps) 
   OdometrySample as_odometry;
   as_odometry.twist.yaw_rate_radps = yaw_rate_radps;
   if (!odometry_fault(as_odometry).empty()) return;
-  jumped(imu_stamps_, stamp, "IMU");
-  if (imu_stamps_.last() != stamp) return;
+  if (!is_new(imu_stamps_, stamp, "IMU")) return;
   imu_yaw_rates_.emplace_back(stamp, yaw_rate_radps);
   while (imu_yaw_rates_.size() > 1 && to_seconds(stamp - imu_yaw_rates_.front().first) > kHistory_s) {
     imu_yaw_rates_.pop_front();
@@ -124,8 +124,7 @@ void LocalizationPipeline::add_odometry(const OdometrySample& sample) {
     event(PipelineEvent::Level::kWarn, "odometry left out: " + fault);
     return;
   }
-  jumped(odometry_stamps_, sample.stamp, "odometry");
-  if (odometry_stamps_.last() != sample.stamp || (last_odometry_ && sample.stamp <= last_odometry_->stamp)) return;
+  if (!is_new(odometry_stamps_, sample.stamp, "odometry")) return;
 
   const double elapsed_s = last_odometry_ ? to_seconds(sample.stamp - last_odometry_->stamp) : 0.0;
   const Twist2 twist = with_imu(sample, last_odometry_ ? last_odometry_->stamp : sample.stamp);
@@ -147,9 +146,7 @@ void LocalizationPipeline::add_odometry(const OdometrySample& sample) {
   }
   if (!initialized_ && start_ && frame_) start(*start_, "the given pose");
   process_fixes();
-  if (!initialized_ || (last_output_ && sample.stamp <= *last_output_)) return;
-  last_output_ = sample.stamp;
-  outputs_.push_back({sample.stamp, localizer_->estimate(), sample.pose, twist});
+  if (initialized_) outputs_.push_back({sample.stamp, localizer_->estimate(), sample.pose, twist});
 }
 
 void LocalizationPipeline::add_fix(const RawFix& fix) {
@@ -162,7 +159,7 @@ void LocalizationPipeline::add_fix(const RawFix& fix) {
     return;
   }
   // A receiver that does not know where it is may not know the time either.
-  if (is_usable_position(fix)) jumped(fix_stamps_, fix.stamp, "fixes");
+  if (is_usable_position(fix)) is_new(fix_stamps_, fix.stamp, "fixes");  // sanitation judges the rest
   if (!frame_) {
     before_datum_.push_back(fix);
     if (before_datum_.size() > kMaxWaitingFixes) before_datum_.pop_front();

@@ -203,6 +203,22 @@ TEST(LocalizationPipeline, OutputStampsAscendF22) {
   EXPECT_EQ(rig.fake->moves.size(), 4u);
 }
 
+TEST(LocalizationPipeline, StampsAscendAcrossAResetThatIsAskedForF22) {
+  Rig rig(kGiven);
+  rig.drive(0.0);
+  rig.drive(5.0);
+  rig.pipeline.take_outputs();
+  rig.pipeline.reset("a test");
+  rig.drive(5.0);  // came twice
+  EXPECT_TRUE(rig.pipeline.take_outputs().empty());
+  rig.drive(5.1);
+  EXPECT_EQ(rig.pipeline.take_outputs().size(), 1u);
+  // A recording that starts over is still seen as that.
+  rig.drive(0.0);
+  EXPECT_TRUE(has_event(rig.pipeline, PipelineEvent::Level::kWarn, "jumped back"));
+  EXPECT_EQ(rig.pipeline.take_outputs().size(), 1u);
+}
+
 TEST(LocalizationPipeline, ClockSetBackGivesTheSameRunAgainF21) {
   for (const bool with_datum : {false, true}) {
     LocalizationParameters parameters;

@@ -127,7 +127,7 @@ class GraphTest(unittest.TestCase):
 
     def test_services(self):
         """toLL and fromLL are inverse; set_pose moves the estimate, and refuses another frame."""
-        self.graph.feed(self.drive.messages[:5])
+        self.graph.feed(self.drive.messages[:60])  # longer than what counts as a late message
         place = rospy.ServiceProxy("toLL", ToLL)(map_point=drive.Odometry().pose.pose.position)
         self.assertTrue(place.success)
         self.assertAlmostEqual(place.latitude, drive.DATUM[0], places=9)
@@ -142,7 +142,7 @@ class GraphTest(unittest.TestCase):
         request.pose.pose.pose.orientation.w = 1.0
         request.pose.pose.covariance[0] = request.pose.pose.covariance[7] = request.pose.pose.covariance[35] = 0.01
         self.assertTrue(rospy.ServiceProxy("set_pose", SetPose)(request).success)
-        moved = self.graph.feed(self.drive.messages[5:6])[-1]
+        moved = self.graph.feed(self.drive.messages[60:61])[-1]
         self.assertAlmostEqual(moved.pose.pose.position.x, 12.0, delta=0.5)
         request.pose.header.frame_id = "odom"
         refused = rospy.ServiceProxy("set_pose", SetPose)(request)

@@ -131,7 +131,7 @@ class LocalizationPipeline {
   /// Sets the antenna's place in the base frame (m), e.g. as tf says it. Requires finite numbers.
   void set_antenna_offset(const Eigen::Vector2d& offset) { parameters_.antenna_offset = {offset.x(), offset.y()}; }
 
-  /// Forgets everything but parameters and a datum that was set.
+  /// Forgets everything but parameters, a datum that was set and what the clocks said: stamps still ascend (F22).
   void reset(const std::string& why);
 
   /// What came of the messages since the last call.
@@ -172,7 +172,8 @@ class LocalizationPipeline {
   void decide_unexamined(const PendingFix& pending, const char* reason);
   void guard_against_non_finite();
   Twist2 with_imu(const OdometrySample& sample, Stamp since);
-  bool jumped(StampMonitor& monitor, Stamp stamp, const char* stream);
+  /// Whether the stamp is newer than the stream's last, or the stream's clock was set back, which resets everything.
+  bool is_new(StampMonitor& monitor, Stamp stamp, const char* stream);
   Eigen::Vector2d antenna_offset() const;
   void event(PipelineEvent::Level level, const std::string& text);
 
@@ -207,7 +208,6 @@ class LocalizationPipeline {
   std::uint64_t fixes_used_{0};
   std::uint64_t fixes_rejected_{0};
 
-  std::optional<Stamp> last_output_;
   std::vector<LocalizationOutput> outputs_;
   std::vector<FixVerdict> verdicts_;
   std::vector<PipelineEvent> events_;
