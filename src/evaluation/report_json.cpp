@@ -3,26 +3,29 @@
 #include <cmath>
 
 namespace urban_gnss {
+
+nlohmann::json number_or_null(double value) {
+  return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr);
+}
+
 namespace {
 
-/// The library would write a NaN as null by itself, but only in text: the value itself must be null for its readers.
-nlohmann::json number(double value) { return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr); }
-
 nlohmann::json to_json(const Summary& summary) {
-  return {{"mean", number(summary.mean)},     {"sigma", number(summary.sigma)}, {"rmse", number(summary.rmse)},
-          {"median", number(summary.median)}, {"p95", number(summary.p95)},     {"max", number(summary.max)}};
+  return {{"mean", number_or_null(summary.mean)}, {"sigma", number_or_null(summary.sigma)},
+          {"rmse", number_or_null(summary.rmse)}, {"median", number_or_null(summary.median)},
+          {"p95", number_or_null(summary.p95)},   {"max", number_or_null(summary.max)}};
 }
 
 }  // namespace
 
 nlohmann::json to_json(const ErrorSummary& summary) {
   return {{"samples", summary.samples},
-          {"coverage", number(summary.coverage)},
+          {"coverage", number_or_null(summary.coverage)},
           {"position_m", to_json(summary.position_m)},
           {"heading_rad", to_json(summary.heading_rad)},
-          {"nees_mean", number(summary.nees_mean)},
-          {"share_below_5m", number(summary.share_below_5m)},
-          {"share_below_10m", number(summary.share_below_10m)}};
+          {"nees_mean", number_or_null(summary.nees_mean)},
+          {"share_below_5m", number_or_null(summary.share_below_5m)},
+          {"share_below_10m", number_or_null(summary.share_below_10m)}};
 }
 
 }  // namespace urban_gnss

@@ -72,7 +72,7 @@ class GpsBiasNode {
   }
 
   void publish() {
-    log_events(pipeline_.take_events());
+    log_.log(pipeline_.take_events());
     for (const BiasEstimate& bias : pipeline_.take_estimates()) {
       bias_publisher_.publish(to_message(bias, frames_.map));
       if (marker_publisher_.getNumSubscribers() > 0) marker_publisher_.publish(bias_markers(bias, frames_.map));
@@ -96,6 +96,7 @@ class GpsBiasNode {
 
   Frames frames_;
   BiasPipeline pipeline_;
+  EventLog log_;
   BiasEstimate last_;
   ros::Publisher bias_publisher_;
   ros::Publisher marker_publisher_;

@@ -55,17 +55,13 @@ class WaypointControllerNode {
     const Pose2 estimate = to_pose2(message.pose.pose);
     const Stamp stamp = to_stamp(message.header.stamp);
     if (!is_finite(estimate)) return;
-    switch (stamps_.observe(stamp)) {
-      case StampMonitor::Order::kNotNewer: return;
-      case StampMonitor::Order::kJumpedBack:
-        ROS_WARN_STREAM("reset: the clock of the estimate jumped back");
-        controller_ = WaypointController(steering_, static_cast<std::size_t>(parameters_.first_target));
-        stamps_.reset();
-        stamps_.observe(stamp);
-        shown_.reset();
-        break;
-      case StampMonitor::Order::kNewer: break;
-    }
+    const bool is_new = stamps_.accept(stamp, [this](Stamp) {
+      ROS_WARN_STREAM("reset: the clock of the estimate jumped back");
+      controller_ = WaypointController(steering_, static_cast<std::size_t>(parameters_.first_target));
+      shown_.reset();
+      return true;
+    });
+    if (!is_new) return;
     const bool was_finished = controller_.finished();
     const BicycleInput input = controller_.steer(estimate);
     geometry_msgs::Twist command;

@@ -2,13 +2,9 @@
 
 #include <utility>
 
+#include "limits.hpp"
+
 namespace urban_gnss {
-namespace {
-
-constexpr double kHistory_s = 10.0;
-constexpr std::size_t kMaxWaitingFixes = 1000;
-
-}  // namespace
 
 void BiasPipelineParameters::check(std::vector<std::string>& faults) const {
   if (antenna_offset.size() != 2) faults.push_back("antenna_offset: must be x and y (m)");
@@ -37,26 +33,22 @@ void BiasPipeline::reset(const std::string& why) {
 }
 
 void BiasPipeline::set_datum(const GeodeticPosition& datum) {
-  const bool is_same = frame_ && frame_->datum().latitude_deg == datum.latitude_deg &&
-                       frame_->datum().longitude_deg == datum.longitude_deg &&
-                       frame_->datum().altitude_m == datum.altitude_m;
-  if (is_same) return;
+  if (frame_ && frame_->datum() == datum) return;
   LocalFrame frame(datum);  // throws before anything changes
   if (frame_) reset("the datum moved");
   frame_ = std::move(frame);
 }
 
-bool BiasPipeline::jumped(StampMonitor& monitor, Stamp stamp, const char* stream) {
-  if (monitor.observe(stamp) != StampMonitor::Order::kJumpedBack || !parameters_.reset_on_time_jump) return false;
-  reset(std::string("the clock of the ") + stream + " jumped back");
-  monitor.observe(stamp);
-  return true;
+bool BiasPipeline::is_new(StampMonitor& monitor, Stamp stamp, const char* stream) {
+  return monitor.accept(stamp, [&](Stamp) {
+    if (parameters_.reset_on_time_jump) reset(std::string("the clock of the ") + stream + " jumped back");
+    return parameters_.reset_on_time_jump;
+  });
 }
 
 void BiasPipeline::add_odometry(const OdometrySample& sample) {
   if (!odometry_fault(sample).empty()) return;
-  jumped(odometry_stamps_, sample.stamp, "odometry");
-  if (odometry_stamps_.last() != sample.stamp || (!history_.empty() && sample.stamp <= history_.latest())) return;
+  if (!is_new(odometry_stamps_, sample.stamp, "odometry")) return;
   if (!history_.empty() && to_seconds(sample.stamp - history_.latest()) > parameters_.odometry_gap) {
     // The localizer starts anew after such a gap, and what the fix is compared with is another estimate.
     history_.clear();
@@ -69,8 +61,7 @@ void BiasPipeline::add_odometry(const OdometrySample& sample) {
 
 void BiasPipeline::add_estimate(Stamp stamp, const Pose2& pose) {
   if (!is_finite(pose)) return;
-  jumped(estimate_stamps_, stamp, "estimate");
-  if (estimate_stamps_.last() != stamp || (!poses_.empty() && stamp <= poses_.back().first)) return;
+  if (!is_new(estimate_stamps_, stamp, "estimate")) return;
   poses_.emplace_back(stamp, pose);
   while (poses_.size() > 2 && to_seconds(stamp - poses_.front().first) > kHistory_s) poses_.pop_front();
   while (process_next_fix()) {
@@ -80,7 +71,7 @@ void BiasPipeline::add_estimate(Stamp stamp, const Pose2& pose) {
 void BiasPipeline::add_fix(const RawFix& fix) {
   if (!frame_) return;
   // A receiver that does not know where it is may not know the time either.
-  if (is_usable_position(fix)) jumped(fix_stamps_, fix.stamp, "fixes");
+  if (is_usable_position(fix)) is_new(fix_stamps_, fix.stamp, "fixes");  // sanitation judges the rest
   SanitizedFix sane = sanitize_fix(fix, *frame_, last_fix_stamp_, parameters_.fix);
   if (is_rejected(sane.verdict.decision)) {
     reject(sane.verdict);

@@ -4,13 +4,12 @@
 #include <cmath>
 #include <utility>
 
+#include "limits.hpp"
 #include "text.hpp"
 
 namespace urban_gnss {
 namespace {
 
-constexpr double kHistory_s = 10.0;
-constexpr std::size_t kMaxWaitingFixes = 1000;
 /// A fix that is farther ahead of the odometry than this has a wrong stamp.
 constexpr double kMaxAhead_s = 10.0;
 
@@ -80,17 +79,12 @@ void LocalizationPipeline::reset(const std::string& why) {
 }
 
 bool LocalizationPipeline::is_new(StampMonitor& monitor, Stamp stamp, const char* stream) {
-  const auto last = monitor.last();
-  switch (monitor.observe(stamp)) {
-    case StampMonitor::Order::kNewer: return true;
-    case StampMonitor::Order::kNotNewer: return false;
-    case StampMonitor::Order::kJumpedBack: break;
-  }
-  if (!parameters_.reset_on_time_jump) return false;
-  reset(std::string("the clock of the ") + stream + " jumped back by " + seconds_text(to_seconds(*last - stamp)));
-  for (StampMonitor* each : {&odometry_stamps_, &fix_stamps_, &imu_stamps_}) each->reset();
-  monitor.observe(stamp);
-  return true;
+  return monitor.accept(stamp, [&](Stamp back) {
+    if (!parameters_.reset_on_time_jump) return false;
+    reset(std::string("the clock of the ") + stream + " jumped back by " + seconds_text(to_seconds(back)));
+    for (StampMonitor* each : {&odometry_stamps_, &fix_stamps_, &imu_stamps_}) each->reset();
+    return true;
+  });
 }
 
 void LocalizationPipeline::add_imu_yaw_rate(Stamp stamp, double yaw_rate_radps) {
@@ -192,9 +186,15 @@ void LocalizationPipeline::add_bias(const BiasEstimate& bias) {
 std::optional<BiasQuery> LocalizationPipeline::bias_query() const {
   if (!initialized_ || !localizer_->wants_bias() || pending_.empty() || history_.empty()) return std::nullopt;
   const PendingFix& next = pending_.front();
-  const auto motion = history_.motion_between(history_.latest(), next.fix.stamp);
+  const auto predicted = predicted_antenna(next.fix.stamp);
+  if (!predicted) return std::nullopt;
+  return BiasQuery{next.fix, next.sanitation, *predicted};
+}
+
+std::optional<Eigen::Vector2d> LocalizationPipeline::predicted_antenna(Stamp stamp) const {
+  const auto motion = history_.motion_between(history_.latest(), stamp);
   if (!motion) return std::nullopt;
-  return BiasQuery{next.fix, next.sanitation, transform_point(compose(localizer_->pose(), *motion), antenna_offset())};
+  return transform_point(compose(localizer_->pose(), *motion), antenna_offset());
 }
 
 Eigen::Vector2d LocalizationPipeline::antenna_offset() const {

@@ -34,10 +34,7 @@ void LocalizationPipeline::set_datum(const GeodeticPosition& datum) {
   LocalFrame checked(datum);  // throws before anything changes
   datum_was_set_ = true;
   if (frame_) {
-    const GeodeticPosition& old = frame_->datum();
-    const bool is_same = old.latitude_deg == datum.latitude_deg && old.longitude_deg == datum.longitude_deg &&
-                         old.altitude_m == datum.altitude_m;
-    if (is_same) return;
+    if (frame_->datum() == datum) return;
     frame_ = std::move(checked);
     reset("the datum was set to another place");
     return;
@@ -88,8 +85,7 @@ bool LocalizationPipeline::try_start(const PendingFix& pending) {
 
 bool LocalizationPipeline::restart_if_lost(const PendingFix& pending) {
   remember_for_start(pending);
-  const Pose2 since = *history_.motion_between(history_.latest(), pending.fix.stamp);
-  const Eigen::Vector2d predicted = transform_point(compose(localizer_->pose(), since), antenna_offset());
+  const Eigen::Vector2d predicted = *predicted_antenna(pending.fix.stamp);
   const double sigma = std::sqrt(pending.fix.covariance.trace());  // of the distance, as the receiver declares it
   if ((pending.fix.position - predicted).norm() <= parameters_.max_bias_radius + kFarSigmas * sigma) {
     far_since_.reset();

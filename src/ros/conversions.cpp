@@ -259,6 +259,16 @@ msgs::LocalizationStatus to_message(const LocalizationReport& report, const Loca
   return message;
 }
 
+std::vector<msgs::LocalizationStatus> to_status_messages(const LocalizationPipeline& pipeline,
+                                                         const std::vector<FixVerdict>& verdicts, const ros::Time& time,
+                                                         const std::string& map_frame) {
+  std::vector<msgs::LocalizationStatus> messages;
+  if (verdicts.empty()) return messages;
+  messages.assign(verdicts.size(), to_message(pipeline.report(), pipeline.localizer(), time, map_frame));
+  for (std::size_t i = 0; i < verdicts.size(); ++i) messages[i].last_fix = to_message(verdicts[i]);
+  return messages;
+}
+
 geometry_msgs::PoseArray to_pose_array(const ParticleSet& particles, const ros::Time& time, const std::string& frame) {
   geometry_msgs::PoseArray message;
   message.header.stamp = time;

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <utility>
 
-#include "urban_gnss_localization/ros/event_log.hpp"
 #include "urban_gnss_localization/ros/topics.hpp"
 
 namespace urban_gnss {
@@ -177,7 +176,7 @@ bool LocalizerNode::reset(std_srvs::Empty::Request&, std_srvs::Empty::Response&)
 }
 
 void LocalizerNode::publish_results() {
-  log_events(pipeline_.take_events());
+  log_.log(pipeline_.take_events());
   publish_datum();
   for (const LocalizationOutput& output : pipeline_.take_outputs()) {
     ++outputs_;
@@ -187,11 +186,14 @@ void LocalizerNode::publish_results() {
     }
     if (on_output_) on_output_(output);
   }
-  for (const FixVerdict& verdict : pipeline_.take_verdicts()) {
+  const std::vector<FixVerdict> verdicts = pipeline_.take_verdicts();
+  for (const FixVerdict& verdict : verdicts) {
     if (is_rejected(verdict.decision)) {
       ROS_WARN_STREAM_THROTTLE(5.0, "fix " << to_string(verdict.decision) << ": " << verdict.reason);
     }
-    publish_status();
+  }
+  for (const auto& status : to_status_messages(pipeline_, verdicts, to_ros(newest_input_), parameters_.frames.map)) {
+    status_publisher_.publish(status);
   }
 }
 
@@ -201,10 +203,7 @@ void LocalizerNode::publish_datum() {
     return;
   }
   const GeodeticPosition& datum = pipeline_.frame()->datum();
-  const bool is_published = published_datum_ && published_datum_->latitude_deg == datum.latitude_deg &&
-                            published_datum_->longitude_deg == datum.longitude_deg &&
-                            published_datum_->altitude_m == datum.altitude_m;
-  if (is_published) return;
+  if (published_datum_ == datum) return;
   datum_publisher_.publish(to_message(datum, to_ros(newest_input_), parameters_.frames.map));
   published_datum_ = datum;
 }

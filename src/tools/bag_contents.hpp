@@ -29,8 +29,10 @@ inline ros::Time to_ros_or_throw(Stamp stamp) {
 /// Messages of many topics on their way into one bag.
 class BagContents {
  public:
+  /// `name` is the topic's without its leading slash; bags have absolute names, as rosbag record writes them.
   template <class Message>
-  void add(const std::string& topic, Stamp stamp, const Message& message) {
+  void add(const std::string& name, Stamp stamp, const Message& message) {
+    const std::string topic = "/" + name;
     auto shared = std::make_shared<const Message>(message);
     entries_.push_back(
         {stamp, [topic, shared](rosbag::Bag& bag, Stamp time) { bag.write(topic, to_ros_or_throw(time), *shared); }});

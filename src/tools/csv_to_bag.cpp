@@ -32,10 +32,12 @@
 #include "urban_gnss_localization/gnss/fix.hpp"
 #include "urban_gnss_localization/motion/motion_model.hpp"
 #include "urban_gnss_localization/ros/conversions.hpp"
+#include "urban_gnss_localization/ros/topics.hpp"
 
 namespace {
 
 namespace fs = std::filesystem;
+namespace topics = urban_gnss::topics;
 using urban_gnss::BagContents;
 using urban_gnss::CsvTable;
 using urban_gnss::GeodeticPosition;
@@ -111,8 +113,8 @@ void add_odometry(const CsvTable& table, const OdometryNoise& noise, BagContents
     transforms.transforms.push_back(
         urban_gnss::to_transform(pose, odometry.header.stamp, odometry.header.frame_id, odometry.child_frame_id));
 
-    contents.add("/tf", table.stamp(row), transforms);
-    contents.add("/odom", table.stamp(row), odometry);
+    contents.add("tf", table.stamp(row), transforms);
+    contents.add(topics::kOdometry, table.stamp(row), odometry);
   }
   if (repeated > 0) {
     std::cerr << table.path() << ": left out " << repeated << " rows with the stamp of the row before them\n";
@@ -144,7 +146,7 @@ void add_fixes(const CsvTable& table, const LocalFrame& frame, BagContents& cont
                                  0.0,          0.0,          0.0, variances[3]};
       fix.position_covariance_type = sensor_msgs::NavSatFix::COVARIANCE_TYPE_KNOWN;
     }
-    contents.add("/gps/fix", table.stamp(row), fix);
+    contents.add(topics::kFix, table.stamp(row), fix);
     if (row > 0 && table.stamp(row) == table.stamp(row - 1)) ++repeated;
 
     const double local_x = table.optional_number(row, x);
@@ -229,7 +231,7 @@ void add_satellites(const CsvTable& table, BagContents& contents) {
                                                                        : Satellite::USE_UNKNOWN;
       array.satellites.push_back(satellite);
     }
-    contents.add("/gps/satellites", stamp, array);
+    contents.add(topics::kSatellites, stamp, array);
   }
 }
 
@@ -245,7 +247,7 @@ void add_velocities(const CsvTable& table, BagContents& contents) {
     velocity.twist.twist.linear.y = table.number(row, north);
     const double climb = table.optional_number(row, up);
     velocity.twist.twist.linear.z = std::isfinite(climb) ? climb : 0.0;
-    contents.add("/gps/velocity", table.stamp(row), velocity);
+    contents.add(topics::kVelocity, table.stamp(row), velocity);
   }
 }
 
@@ -278,7 +280,7 @@ void add_imu(const CsvTable& table, BagContents& contents) {
       imu.orientation.w = 1.0;
       imu.orientation_covariance[0] = -1.0;  // sensor_msgs/Imu: no orientation
     }
-    contents.add("/imu/data", table.stamp(row), imu);
+    contents.add(topics::kImu, table.stamp(row), imu);
   }
 }
 
@@ -297,7 +299,7 @@ void add_truth(const CsvTable& table, BagContents& contents) {
     truth.pose.pose = urban_gnss::to_message(Pose2{table.number(row, x), table.number(row, y), table.number(row, yaw)});
     truth.pose.pose.position.z = or_zero(table.optional_number(row, z));
     truth.twist.twist.linear.x = or_zero(table.optional_number(row, speed));
-    contents.add("/ground_truth/odom", table.stamp(row), truth);
+    contents.add(topics::kTruth, table.stamp(row), truth);
   }
 }
 
@@ -324,7 +326,7 @@ void convert(const fs::path& folder, const std::string& gnss_file, const Odometr
 
   // The order of these calls is the order of messages with the same stamp: whatever a fix is compared with comes first.
   BagContents contents;
-  contents.add("/gps/datum", start, urban_gnss::to_message(origin, urban_gnss::to_ros_or_throw(start), "map"));
+  contents.add(topics::kDatum, start, urban_gnss::to_message(origin, urban_gnss::to_ros_or_throw(start), "map"));
   add_odometry(odometry, noise, contents);
   add_fixes(fixes, LocalFrame(origin), contents);
   for (const auto& [table, add] : optional_tables) add(table, contents);

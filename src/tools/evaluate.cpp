@@ -13,7 +13,6 @@
 #include <cstdio>
 #include <exception>
 #include <filesystem>
-#include <fstream>
 #include <iomanip>
 #include <iostream>
 #include <limits>
@@ -24,6 +23,7 @@
 #include <string>
 #include <vector>
 
+#include "output_file.hpp"
 #include "urban_gnss_localization/evaluation/report_json.hpp"
 #include "urban_gnss_localization/evaluation/stamp_text.hpp"
 #include "urban_gnss_localization/evaluation/trajectory_errors.hpp"
@@ -32,6 +32,7 @@
 #include "urban_gnss_localization/geometry/local_frame.hpp"
 #include "urban_gnss_localization/ros/conversions.hpp"
 #include "urban_gnss_localization/ros/plotting.hpp"
+#include "urban_gnss_localization/ros/topics.hpp"
 
 namespace {
 
@@ -43,6 +44,7 @@ using urban_gnss::Summary;
 using urban_gnss::TimedPose;
 using urban_gnss::Trajectory;
 using urban_gnss::TrajectoryErrors;
+using urban_gnss::without_leading_slash;
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
@@ -50,9 +52,9 @@ struct Options {
   std::vector<std::string> bags;
   std::string output;
   std::string truth_bag;
-  std::string truth_topic{"ground_truth/odom"};
-  std::vector<std::string> estimate_topics{"odometry/filtered"};
-  std::string fix_topic{"gps/fix"};
+  std::string truth_topic{urban_gnss::topics::kTruth};
+  std::vector<std::string> estimate_topics{urban_gnss::topics::kEstimate};
+  std::string fix_topic{urban_gnss::topics::kFix};
   double max_gap_s{1.0};
   bool plots{true};
 };
@@ -62,10 +64,6 @@ struct Run {
   std::string name;  ///< "<bag's stem>/<topic>"
   TrajectoryErrors errors;
 };
-
-std::string without_leading_slash(const std::string& topic) {
-  return !topic.empty() && topic.front() == '/' ? topic.substr(1) : topic;
-}
 
 std::string as_file_name(std::string name) {
   for (char& c : name) {
@@ -116,7 +114,7 @@ std::optional<OdometryTrack> read_odometry(const rosbag::Bag& bag, const std::st
 
 std::optional<LocalFrame> read_datum(const rosbag::Bag& bag) {
   std::optional<LocalFrame> frame;
-  for_each_message<sensor_msgs::NavSatFix>(bag, "gps/datum", [&](const sensor_msgs::NavSatFix& datum) {
+  for_each_message<sensor_msgs::NavSatFix>(bag, urban_gnss::topics::kDatum, [&](const sensor_msgs::NavSatFix& datum) {
     frame.emplace(urban_gnss::GeodeticPosition{datum.latitude, datum.longitude, datum.altitude});
   });
   return frame;
@@ -144,18 +142,6 @@ Trajectory read_fixes(const rosbag::Bag& bag, const std::string& topic, const Lo
   return fixes;
 }
 
-/// Opens a file for writing; close_file() reports whether all of it arrived.
-std::ofstream open_file(const fs::path& path) {
-  std::ofstream file(path, std::ios::binary);
-  if (!file) throw std::runtime_error(path.string() + ": cannot be written");
-  return file;
-}
-
-void close_file(std::ofstream& file, const fs::path& path) {
-  file.close();
-  if (!file) throw std::runtime_error(path.string() + ": could not be written in full");
-}
-
 /// A number with nine significant digits, NaN as "nan" whatever its sign.
 std::string cell(double value) {
   if (std::isnan(value)) return "nan";
@@ -165,31 +151,29 @@ std::string cell(double value) {
 }
 
 void write_error_series(const fs::path& path, const std::vector<ErrorSample>& samples, Stamp start) {
-  std::ofstream file = open_file(path);
-  file << "t,position_error_m,heading_error_rad,est_x,est_y,truth_x,truth_y,sigma_m,nees\n";
-  for (const ErrorSample& sample : samples) {
-    file << urban_gnss::format_stamp(sample.stamp - start) << ',' << cell(sample.position_error_m) << ','
-         << cell(sample.heading_error_rad) << ',' << cell(sample.estimate.x) << ',' << cell(sample.estimate.y) << ','
-         << cell(sample.truth.x) << ',' << cell(sample.truth.y) << ',' << cell(sample.position_sigma_m) << ','
-         << cell(sample.nees) << '\n';
-  }
-  close_file(file, path);
+  urban_gnss::write_file(path, [&](std::ostream& file) {
+    file << "t,position_error_m,heading_error_rad,est_x,est_y,truth_x,truth_y,sigma_m,nees\n";
+    for (const ErrorSample& sample : samples) {
+      file << urban_gnss::format_stamp(sample.stamp - start) << ',' << cell(sample.position_error_m) << ','
+           << cell(sample.heading_error_rad) << ',' << cell(sample.estimate.x) << ',' << cell(sample.estimate.y) << ','
+           << cell(sample.truth.x) << ',' << cell(sample.truth.y) << ',' << cell(sample.position_sigma_m) << ','
+           << cell(sample.nees) << '\n';
+    }
+  });
 }
 
 void write_fix_series(const fs::path& path, const std::vector<ErrorSample>& samples, Stamp start) {
-  std::ofstream file = open_file(path);
-  file << "t,fix_x,fix_y,error_m\n";
-  for (const ErrorSample& sample : samples) {
-    file << urban_gnss::format_stamp(sample.stamp - start) << ',' << cell(sample.estimate.x) << ','
-         << cell(sample.estimate.y) << ',' << cell(sample.position_error_m) << '\n';
-  }
-  close_file(file, path);
+  urban_gnss::write_file(path, [&](std::ostream& file) {
+    file << "t,fix_x,fix_y,error_m\n";
+    for (const ErrorSample& sample : samples) {
+      file << urban_gnss::format_stamp(sample.stamp - start) << ',' << cell(sample.estimate.x) << ','
+           << cell(sample.estimate.y) << ',' << cell(sample.position_error_m) << '\n';
+    }
+  });
 }
 
 void write_trajectory(const fs::path& path, const Trajectory& trajectory) {
-  std::ofstream file = open_file(path);
-  urban_gnss::write_tum(file, trajectory);
-  close_file(file, path);
+  urban_gnss::write_file(path, [&](std::ostream& file) { urban_gnss::write_tum(file, trajectory); });
 }
 
 /// What was scored, for other tools that read TUM files. Fixes, which have no yaw, get zero.
@@ -302,9 +286,7 @@ void print_table(std::ostream& out, const std::vector<Run>& runs) {
 void write_metrics(const fs::path& path, const std::vector<Run>& runs) {
   nlohmann::json metrics = {{"runs", nlohmann::json::object()}};
   for (const Run& run : runs) metrics["runs"][run.name] = urban_gnss::to_json(run.errors.summary);
-  std::ofstream file = open_file(path);
-  file << metrics.dump(2) << '\n';
-  close_file(file, path);
+  urban_gnss::write_file(path, [&](std::ostream& file) { file << metrics.dump(2) << '\n'; });
 }
 
 void evaluate(const Options& options) {

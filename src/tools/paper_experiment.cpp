@@ -19,7 +19,9 @@
 #include <sstream>
 #include <thread>
 
+#include "output_file.hpp"
 #include "urban_gnss_localization/common/progress.hpp"
+#include "urban_gnss_localization/evaluation/report_json.hpp"
 #include "urban_gnss_localization/evaluation/statistics.hpp"
 #include "urban_gnss_localization/ros/plotting.hpp"
 
@@ -180,8 +182,6 @@ void append(std::vector<double>& all, const std::vector<double>& part) {
   all.insert(all.end(), part.begin(), part.end());
 }
 
-nlohmann::json number(double value) { return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr); }
-
 nlohmann::json zone_json(const std::vector<RunErrors>& runs, int zone) {
   std::vector<double> position;
   std::vector<double> heading;
@@ -191,9 +191,9 @@ nlohmann::json zone_json(const std::vector<RunErrors>& runs, int zone) {
   }
   const Summary p = summarize(std::move(position));
   const Summary h = summarize(std::move(heading));
-  return {{"position_rmse_m", number(p.rmse)},  {"position_p95_m", number(p.p95)},
-          {"position_max_m", number(p.max)},    {"position_median_m", number(p.median)},
-          {"heading_rmse_rad", number(h.rmse)}, {"steps", p.count}};
+  return {{"position_rmse_m", number_or_null(p.rmse)},  {"position_p95_m", number_or_null(p.p95)},
+          {"position_max_m", number_or_null(p.max)},    {"position_median_m", number_or_null(p.median)},
+          {"heading_rmse_rad", number_or_null(h.rmse)}, {"steps", p.count}};
 }
 
 nlohmann::json method_json(const PaperMethod& method, const std::vector<RunErrors>& runs) {
@@ -209,13 +209,12 @@ nlohmann::json method_json(const PaperMethod& method, const std::vector<RunError
           {"sun", zone_json(runs, 0)},
           {"shadow", zone_json(runs, 1)},
           {"diverged", diverged},
-          {"cross_track_rmse_m", number(summarize(std::move(cross_track)).rmse)},
+          {"cross_track_rmse_m", number_or_null(summarize(std::move(cross_track)).rmse)},
           {"seeds", runs.size()},
           {"cpu_s", runtime}};
 }
 
-void write_curves(const fs::path& file, const std::vector<RunErrors>& runs, double interval_s) {
-  std::ofstream out(file);
+void write_curves(std::ostream& out, const std::vector<RunErrors>& runs, double interval_s) {
   out << "t,position_rmse_m,position_p95_m,heading_rmse_rad\n" << std::setprecision(9);
   for (std::size_t i = 0;; ++i) {
     std::vector<double> position;
@@ -335,20 +334,18 @@ void run_all(const Options& options, const std::string& command) {
   print_table(metrics);
 
   const auto write_json = [&](const fs::path& file) {
-    if (file.has_parent_path()) fs::create_directories(file.parent_path());
-    std::ofstream out(file);
-    out << metrics.dump(2) << '\n';
-    if (!out) throw std::runtime_error(file.string() + ": cannot be written");
+    write_file(file, [&](std::ostream& out) { out << metrics.dump(2) << '\n'; });
   };
   if (!options.json_file.empty()) write_json(options.json_file);
   if (options.plots.empty()) return;
   write_json(fs::path(options.plots) / "metrics.json");
-  std::ofstream targets(data / "targets.csv");
-  targets << "x,y\n";
-  for (const auto& target : conditions.controller.target_points()) targets << target.x() << ',' << target.y() << '\n';
-  targets.close();
+  write_file(data / "targets.csv", [&](std::ostream& out) {
+    out << "x,y\n";
+    for (const auto& target : conditions.controller.target_points()) out << target.x() << ',' << target.y() << '\n';
+  });
   for (std::size_t m = 0; m < methods.size(); ++m) {
-    write_curves(data / ("errors_over_seeds_" + methods[m].name + ".csv"), results[m], conditions.field.interval);
+    write_file(data / ("errors_over_seeds_" + methods[m].name + ".csv"),
+               [&](std::ostream& out) { write_curves(out, results[m], conditions.field.interval); });
   }
   run_plotter("plot_paper_experiment.py", options.plots);
 }

@@ -9,12 +9,12 @@
 #include <chrono>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <iomanip>
 #include <iostream>
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "output_file.hpp"
 #include "urban_gnss_localization/common/progress.hpp"
 #include "urban_gnss_localization/evaluation/report_json.hpp"
 #include "urban_gnss_localization/evaluation/tum.hpp"
@@ -97,12 +97,10 @@ Parameters read_parameters(const Options& options) {
   return parameters;
 }
 
-std::string without_slash(const std::string& topic) { return topic.rfind('/', 0) == 0 ? topic.substr(1) : topic; }
-
 /// The messages of the bag in a fixed order: by the time they were recorded, then by what they are (as in `names`).
 std::vector<rosbag::MessageInstance> ordered_messages(const rosbag::Bag& bag, const std::vector<std::string>& names) {
   rosbag::View view(bag, [&](const rosbag::ConnectionInfo* connection) {
-    return std::find(names.begin(), names.end(), without_slash(connection->topic)) != names.end();
+    return std::find(names.begin(), names.end(), without_leading_slash(connection->topic)) != names.end();
   });
   const std::vector<rosbag::MessageInstance> as_read(view.begin(), view.end());
   struct Key {
@@ -113,7 +111,7 @@ std::vector<rosbag::MessageInstance> ordered_messages(const rosbag::Bag& bag, co
   std::vector<Key> keys;
   keys.reserve(as_read.size());
   for (std::size_t i = 0; i < as_read.size(); ++i) {
-    const auto name = std::find(names.begin(), names.end(), without_slash(as_read[i].getTopic()));
+    const auto name = std::find(names.begin(), names.end(), without_leading_slash(as_read[i].getTopic()));
     keys.push_back({as_read[i].getTime(), name - names.begin(), i});
   }
   std::stable_sort(keys.begin(), keys.end(),
@@ -221,10 +219,10 @@ class Replay {
       tf.transforms.push_back(to_map_to_odom(output, parameters_.node.frames, parameters_.node.transform_time_offset));
       write("tf", output.stamp, tf);
     }
-    for (const FixVerdict& verdict : pipeline_.take_verdicts()) {
-      ++decisions_[to_string(verdict.decision)];
-      write("status", newest_,
-            to_message(pipeline_.report(), pipeline_.localizer(), to_ros(newest_), parameters_.node.frames.map));
+    const std::vector<FixVerdict> verdicts = pipeline_.take_verdicts();
+    for (const FixVerdict& verdict : verdicts) ++decisions_[to_string(verdict.decision)];
+    for (const auto& status : to_status_messages(pipeline_, verdicts, to_ros(newest_), parameters_.node.frames.map)) {
+      write(topics::kStatus, newest_, status);
     }
   }
 
@@ -244,15 +242,6 @@ class Replay {
   Trajectory truth_;
   std::map<std::string, std::size_t> decisions_;
 };
-
-void write_file(const std::string& file, const std::function<void(std::ostream&)>& write) {
-  const fs::path path(file);
-  if (path.has_parent_path()) fs::create_directories(path.parent_path());
-  std::ofstream out(path);
-  write(out);
-  out.close();
-  if (!out) throw std::runtime_error(file + ": cannot be written");
-}
 
 void print_summary(const Replay& replay, const nlohmann::json& metrics, double wall_s, double bag_s) {
   std::cout << replay.estimate().size() << " estimates in " << std::fixed << std::setprecision(2) << wall_s << " s ("
@@ -274,14 +263,14 @@ void run(const Options& options) {
   if (!fs::exists(options.input)) throw std::runtime_error(options.input + ": no such bag");
   rosbag::Bag bag(options.input, rosbag::bagmode::Read);
 
-  const std::string fix = without_slash(options.fix_topic);
-  const std::string odom = without_slash(options.odom_topic);
-  const std::string imu = without_slash(options.imu_topic);
-  const std::string truth = without_slash(options.truth_topic);
+  const std::string fix = without_leading_slash(options.fix_topic);
+  const std::string odom = without_leading_slash(options.odom_topic);
+  const std::string imu = without_leading_slash(options.imu_topic);
+  const std::string truth = without_leading_slash(options.truth_topic);
   const auto messages = ordered_messages(bag, {topics::kDatum, imu, odom, fix, truth});
   const auto count = [&](const std::string& name) {
     return std::count_if(messages.begin(), messages.end(),
-                         [&](const auto& message) { return without_slash(message.getTopic()) == name; });
+                         [&](const auto& message) { return without_leading_slash(message.getTopic()) == name; });
   };
   for (const auto& [option, name] :
        {std::pair("--fix-topic", fix), std::pair("--odom-topic", odom), std::pair("--imu-topic", imu)}) {
@@ -300,7 +289,7 @@ void run(const Options& options) {
   const auto start = std::chrono::steady_clock::now();
   std::size_t done = 0;
   for (const rosbag::MessageInstance& message : messages) {
-    const std::string name = without_slash(message.getTopic());
+    const std::string name = without_leading_slash(message.getTopic());
     if (name == odom) {
       replay.add_odometry(*expect<nav_msgs::Odometry>(message));
     } else if (name == fix) {

@@ -11,6 +11,8 @@ import subprocess
 import tempfile
 import unittest
 
+import rosbag
+
 PROGRAMS = os.environ.get("URBAN_GNSS_PROGRAMS", "")
 PACKAGE = os.path.realpath(os.path.join(os.path.dirname(os.path.realpath(__file__)), "..", ".."))
 DATA = os.environ.get("URBAN_GNSS_DATA", os.path.join(PACKAGE, "..", "shared", "data"))
@@ -140,6 +142,24 @@ class ToolTest(unittest.TestCase):
             self.assertLess(json.load(file)["errors"]["position_m"]["max"], 10.0)
         first, other = (open(self.path(name)).readlines()[-1].split() for name in ("a.tum", "d.tum"))
         self.assertAlmostEqual(float(first[2]) - float(other[2]), 111.2, delta=5.0)
+
+    def test_every_fix_gets_its_decision(self):
+        """F2: also where two fixes are decided upon at once, between two messages of slow odometry."""
+        write_recording(self.directory)
+        with open(self.path("odom.csv")) as file:
+            lines = file.readlines()
+        with open(self.path("odom.csv"), "w") as file:
+            file.writelines(lines[:1] + lines[16::20])  # every 2 s, between the fixes
+        self.succeed("csv_to_bag", self.directory, self.path("in.bag"))
+        self.succeed("replay", self.path("in.bag"), "--set", "odometry_gap=5.0", "--set",
+                     "initial_pose=[0.0, 0.0, 0.0]", "--output", self.path("out.bag"), "--json", self.path("out.json"))
+        with rosbag.Bag(self.path("out.bag")) as bag:
+            stamps = [status.last_fix.stamp for _, status, _ in bag.read_messages("/status")]
+        with open(self.path("out.json")) as file:
+            decisions = json.load(file)["decisions"]
+        self.assertEqual(len(stamps), sum(decisions.values()))
+        self.assertEqual(len(set(stamps)), len(stamps))
+        self.assertGreater(len(stamps), 40)
 
     def test_replay_refuses(self):
         write_recording(self.directory)

@@ -14,6 +14,10 @@ struct GeodeticPosition {
   double altitude_m{0.0};
 };
 
+inline bool operator==(const GeodeticPosition& a, const GeodeticPosition& b) {
+  return a.latitude_deg == b.latitude_deg && a.longitude_deg == b.longitude_deg && a.altitude_m == b.altitude_m;
+}
+
 /// How far a receiver says its covariance can be trusted (sensor_msgs/NavSatFix::position_covariance_type).
 enum class CovarianceType { kUnknown, kApproximated, kDiagonalKnown, kKnown };
 

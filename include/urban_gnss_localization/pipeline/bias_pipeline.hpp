@@ -59,7 +59,7 @@ class BiasPipeline {
  private:
   bool process_next_fix();
   std::optional<Pose2> pose_at(Stamp stamp) const;
-  bool jumped(StampMonitor& monitor, Stamp stamp, const char* stream);
+  bool is_new(StampMonitor& monitor, Stamp stamp, const char* stream);
   void reject(const FixVerdict& verdict);
 
   BiasPipelineParameters parameters_;

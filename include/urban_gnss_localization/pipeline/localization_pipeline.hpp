@@ -175,6 +175,8 @@ class LocalizationPipeline {
   /// Whether the stamp is newer than the stream's last, or the stream's clock was set back, which resets everything.
   bool is_new(StampMonitor& monitor, Stamp stamp, const char* stream);
   Eigen::Vector2d antenna_offset() const;
+  /// Where the antenna was at `stamp` (m, map frame), by the estimate now; nothing outside the odometry's history.
+  std::optional<Eigen::Vector2d> predicted_antenna(Stamp stamp) const;
   void event(PipelineEvent::Level level, const std::string& text);
 
   LocalizationParameters parameters_;

@@ -11,20 +11,21 @@ namespace urban_gnss {
 /// from a message that comes late or twice.
 class StampMonitor {
  public:
-  enum class Order { kNewer, kNotNewer, kJumpedBack };
-
   /// `jump_s` > 0: going back by more than this is a jump.
   explicit StampMonitor(double jump_s) : jump_(from_seconds(jump_s)) {}
 
-  /// Judges a stamp; only a newer one is remembered.
-  Order observe(Stamp stamp) {
-    if (last_ && stamp < *last_ - jump_) return Order::kJumpedBack;
-    if (last_ && stamp <= *last_) return Order::kNotNewer;
+  /// Whether a message with this stamp is to be used: one that is newer than the last is, one that is late or comes
+  /// twice is not. Where the clock was set back, `on_jump` is told by how much and says whether to follow it.
+  template <class OnJump>
+  bool accept(Stamp stamp, const OnJump& on_jump) {
+    if (last_ && stamp <= *last_) {
+      const Stamp back = *last_ - stamp;
+      if (back <= jump_ || !on_jump(back)) return false;
+    }
     last_ = stamp;
-    return Order::kNewer;
+    return true;
   }
 
-  std::optional<Stamp> last() const { return last_; }
   void reset() { last_.reset(); }
 
  private:

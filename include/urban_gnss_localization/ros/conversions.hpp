@@ -14,6 +14,7 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "urban_gnss_localization/evaluation/trajectory.hpp"
 #include "urban_gnss_localization/filters/bias_kalman_filter.hpp"
@@ -73,6 +74,13 @@ urban_gnss_localization::GpsBias to_message(const BiasEstimate& bias, const std:
 BiasEstimate to_bias_estimate(const urban_gnss_localization::GpsBias& message);
 urban_gnss_localization::LocalizationStatus to_message(const LocalizationReport& report, const Localizer& localizer,
                                                        const ros::Time& time, const std::string& map_frame);
+
+/// The state once for each verdict, so that no decision goes unpublished where several came at once (F2). Computes the
+/// state once; nothing where there is no verdict.
+std::vector<urban_gnss_localization::LocalizationStatus> to_status_messages(const LocalizationPipeline& pipeline,
+                                                                            const std::vector<FixVerdict>& verdicts,
+                                                                            const ros::Time& time,
+                                                                            const std::string& map_frame);
 
 geometry_msgs::PoseArray to_pose_array(const ParticleSet& particles, const ros::Time& time, const std::string& frame);
 /// Fields x, y, z (m; z = 0), yaw (rad), weight (sums to 1), intensity (weight relative to the heaviest, 0 to 1).

@@ -21,6 +21,7 @@
 
 #include "urban_gnss_localization/pipeline/localization_pipeline.hpp"
 #include "urban_gnss_localization/ros/conversions.hpp"
+#include "urban_gnss_localization/ros/event_log.hpp"
 #include "urban_gnss_localization/ros/input_watch.hpp"
 
 namespace urban_gnss {
@@ -89,6 +90,7 @@ class LocalizerNode {
   LocalizerNodeParameters parameters_;
   LocalizationPipeline pipeline_;
   OutputHook on_output_;
+  EventLog log_;
   Stamp newest_input_{0};
   bool antenna_known_{false};
   bool antenna_warned_{false};

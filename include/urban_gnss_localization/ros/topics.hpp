@@ -1,10 +1,23 @@
 #pragma once
 
+#include <string>
+
+namespace urban_gnss {
+
+/// A topic's name as the ones below are written, however a bag or a user writes it.
+inline std::string without_leading_slash(const std::string& topic) {
+  return !topic.empty() && topic.front() == '/' ? topic.substr(1) : topic;
+}
+
+}  // namespace urban_gnss
+
 /// Names of the graph, relative to the node's namespace. Each stands here once; launch files remap them.
 namespace urban_gnss::topics {
 
 inline constexpr char kOdometry[] = "odom";
 inline constexpr char kFix[] = "gps/fix";
+inline constexpr char kSatellites[] = "gps/satellites";
+inline constexpr char kVelocity[] = "gps/velocity";
 inline constexpr char kBias[] = "gps/bias";
 inline constexpr char kBiasMarkers[] = "gps/bias_markers";
 inline constexpr char kDatum[] = "gps/datum";

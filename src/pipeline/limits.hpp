@@ -1,0 +1,12 @@
+#pragma once
+
+#include <cstddef>
+
+namespace urban_gnss {
+
+/// How long a pipeline remembers odometry, yaw rates and estimates.
+inline constexpr double kHistory_s = 10.0;
+/// How many fixes, or biases, may wait for what they need; the oldest go first.
+inline constexpr std::size_t kMaxWaitingFixes = 1000;
+
+}  // namespace urban_gnss
