@@ -19,6 +19,7 @@
 #include "urban_gnss_localization/evaluation/report_json.hpp"
 #include "urban_gnss_localization/evaluation/tum.hpp"
 #include "urban_gnss_localization/filters/particle_filter.hpp"
+#include "urban_gnss_localization/filters/ukf.hpp"
 #include "urban_gnss_localization/ros/conversions.hpp"
 #include "urban_gnss_localization/ros/localizer_node.hpp"
 #include "urban_gnss_localization/ros/topics.hpp"
@@ -48,6 +49,7 @@ struct Options {
 struct Parameters {
   LocalizerNodeParameters node;
   ParticleFilterParameters filter;
+  UkfParameters ukf;
   MotionParameters motion;
   GpsBiasParameters bias;
 };
@@ -68,7 +70,7 @@ YAML::Node merge_parameters(const Options& options) {
     }
     if (!map.IsMap() && !map.IsNull())
       throw std::runtime_error("--params " + file + ": must be a map of names to values");
-    for (const char* section : {"gps_bias", "particle_filter"}) {
+    for (const char* section : {"gps_bias", "particle_filter", "ukf"}) {
       if (!map.IsMap() || !map[section].IsDefined()) continue;
       merge(map[section]);
       map.remove(section);
@@ -91,8 +93,14 @@ Parameters read_parameters(const Options& options) {
   ParameterReader reader(merge_parameters(options));
   for (const char* live_only : {"particle_cloud_rate", "estimate_timeout", "diagnostic_period"})
     reader.ignore(live_only);
-  const auto faults =
-      reader.read(parameters.node).read(parameters.filter).read(parameters.motion).read(parameters.bias).finish();
+  reader.read(parameters.node).read(parameters.motion).read(parameters.bias);
+  if (options.localizer == "ukf") {
+    reader.read(parameters.ukf);
+    reader.ignore("seed");  // nothing in it is random
+  } else {
+    reader.read(parameters.filter);
+  }
+  const auto faults = reader.finish();
   if (!faults.empty()) throw ParameterError("replay", faults);
   return parameters;
 }
@@ -194,7 +202,8 @@ class Replay {
  private:
   static std::unique_ptr<Localizer> make_localizer(const std::string& name, const Parameters& parameters) {
     if (name == "particle_filter") return std::make_unique<ParticleFilter>(parameters.filter, parameters.motion);
-    throw std::runtime_error("--localizer " + name + ": no such localizer; there is particle_filter");
+    if (name == "ukf") return std::make_unique<Ukf>(parameters.ukf, parameters.motion);
+    throw std::runtime_error("--localizer " + name + ": no such localizer; there are particle_filter, ukf");
   }
 
   /// Answers the pipeline's questions for the bias, as gps_bias_node does live, and writes what came of it.
@@ -341,7 +350,7 @@ int main(int argc, char** argv) {
   CLI::App app("Runs a bag through a localizer offline; the same input, parameters and seed give the same output.");
   app.option_defaults()->always_capture_default();
   app.add_option("bag", options.input, "the bag to read")->required();
-  app.add_option("--localizer", options.localizer, "particle_filter");
+  app.add_option("--localizer", options.localizer, "particle_filter, ukf");
   app.add_option("--params", options.params, "YAML with the nodes' parameters; repeatable, later files win");
   app.add_option("--set", options.overrides, "one parameter, NAME=VALUE; repeatable");
   app.add_option("--output", options.output, "bag to write: odometry/filtered, gps/bias, status, tf");

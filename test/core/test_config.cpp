@@ -12,6 +12,7 @@
 #include "matchers.hpp"
 #include "urban_gnss_localization/control/waypoint_controller.hpp"
 #include "urban_gnss_localization/filters/particle_filter.hpp"
+#include "urban_gnss_localization/filters/ukf.hpp"
 #include "urban_gnss_localization/pipeline/bias_pipeline.hpp"
 #include "urban_gnss_localization/pipeline/localization_pipeline.hpp"
 #include "urban_gnss_localization/simulation/paper_field.hpp"
@@ -139,6 +140,10 @@ TEST(Config, ParticleFilterStatesEveryDefault) {
                        merged(defaults_of(ParticleFilterParameters()), defaults_of(MotionParameters()))));
 }
 
+TEST(Config, UkfStatesEveryDefault) {
+  expect_states(values_of(load("ukf.yaml")), merged(defaults_of(UkfParameters()), defaults_of(MotionParameters())));
+}
+
 TEST(Config, GpsBiasStatesEveryDefault) {
   expect_states(values_of(load("gps_bias.yaml")), merged(frames(), defaults_of(BiasPipelineParameters())));
 }
@@ -152,6 +157,9 @@ TEST(Config, DefaultsAreReadWithoutFault) {
   const Values localizer = merged(values_of(load("localization.yaml")), values_of(load("particle_filter.yaml")));
   EXPECT_EQ(joined(faults_in(localizer, filter_node(), LocalizationParameters(), ParticleFilterParameters(),
                              MotionParameters())),
+            kNoFault);
+  EXPECT_EQ(joined(faults_in(merged(values_of(load("localization.yaml")), values_of(load("ukf.yaml"))), shell(),
+                             LocalizationParameters(), UkfParameters(), MotionParameters())),
             kNoFault);
   EXPECT_EQ(joined(faults_in(values_of(load("gps_bias.yaml")), frames(), BiasPipelineParameters())), kNoFault);
   EXPECT_EQ(
@@ -202,7 +210,7 @@ TEST(Config, RosparamReadsTheSameValues) {
   const std::regex text_for_rosparam("[-+]?[0-9]+[eE].*|[-+]?[0-9.]+[eE][0-9].*");
   const std::regex boolean_for_rosparam("on|off|yes|no|y|n", std::regex::icase);
   for (const char* name :
-       {"localization.yaml", "particle_filter.yaml", "gps_bias.yaml", "waypoint_controller.yaml",
+       {"localization.yaml", "particle_filter.yaml", "ukf.yaml", "gps_bias.yaml", "waypoint_controller.yaml",
         "paper_field/localization.yaml", "paper_field/particle_filter.yaml", "paper_field/gps_bias.yaml",
         "paper_field/waypoint_controller.yaml", "paper_field/simulator.yaml"}) {
     for (const auto& [key, value] : values_of(load(name))) {
@@ -219,7 +227,8 @@ TEST(Config, RosparamReadsTheSameValues) {
 TEST(Config, EveryDefaultIsExplained) {
   const std::regex parameter("(\\w+):.*");
   const std::regex explained("\\w+: .*# \\S.*");
-  for (const char* name : {"localization.yaml", "particle_filter.yaml", "gps_bias.yaml", "waypoint_controller.yaml"}) {
+  for (const char* name :
+       {"localization.yaml", "particle_filter.yaml", "ukf.yaml", "gps_bias.yaml", "waypoint_controller.yaml"}) {
     std::istringstream lines(read_text(std::string("config/") + name));
     for (std::string line; std::getline(lines, line);) {
       if (!std::regex_match(line, parameter)) continue;

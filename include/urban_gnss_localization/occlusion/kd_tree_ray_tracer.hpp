@@ -1,0 +1,55 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "urban_gnss_localization/common/parameters.hpp"
+#include "urban_gnss_localization/occlusion/point_cloud.hpp"
+#include "urban_gnss_localization/occlusion/ray_tracer.hpp"
+
+namespace urban_gnss {
+
+/// Parameters of Algorithm 2. The search radius is bounded and linear in the range r:
+/// min(search_radius + search_radius_slope r, search_radius_max).
+struct KdTreeRayTracerParameters {
+  double min_range{1.0};             ///< m, nearer is the robot itself
+  double max_range{500.0};           ///< m
+  double range_step{0.5};            ///< m, r_inc
+  double search_radius{0.3};         ///< m, at the antenna
+  double search_radius_slope{0.02};  ///< 0 keeps the radius fixed
+  double search_radius_max{2.0};     ///< m
+  int min_neighbours{1};             ///< so many points within the radius obstruct
+  double epsilon{0.0};               ///< the search may be wrong by the factor 1 + epsilon (Arya et al. 1998)
+
+  template <class V>
+  void visit(V& v) {
+    v("min_range", min_range, non_negative());
+    v("max_range", max_range, positive());
+    v("range_step", range_step, positive());
+    v("search_radius", search_radius, positive());
+    v("search_radius_slope", search_radius_slope, non_negative());
+    v("search_radius_max", search_radius_max, positive());
+    v("min_neighbours", min_neighbours, at_least(1));
+    v("epsilon", epsilon, non_negative());
+  }
+  void check(std::vector<std::string>& faults) const;
+};
+
+/// Algorithm 2 of Maier & Kleiner 2010 as printed, on PCL's kd-tree: the reference for VoxelRayTracer. Two things are
+/// added: a step beyond the map's bounding box is not searched, and range_m is the range of the obstructed query point.
+class KdTreeRayTracer : public RayTracer {
+ public:
+  /// Non-finite points of `cloud` are left out; an empty cloud obstructs nothing. Throws ParameterError.
+  KdTreeRayTracer(const PointCloud& cloud, const KdTreeRayTracerParameters& parameters);
+  ~KdTreeRayTracer() override;
+
+  RayVerdict trace(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const override;
+
+ private:
+  struct Tree;  // keeps PCL's headers out of this one
+  std::unique_ptr<Tree> tree_;
+  KdTreeRayTracerParameters parameters_;
+};
+
+}  // namespace urban_gnss

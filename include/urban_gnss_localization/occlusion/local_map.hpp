@@ -1,0 +1,83 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "urban_gnss_localization/common/parameters.hpp"
+#include "urban_gnss_localization/occlusion/point_cloud.hpp"
+#include "urban_gnss_localization/occlusion/scan_aligner.hpp"
+#include "urban_gnss_localization/occlusion/voxel_map.hpp"
+
+namespace urban_gnss {
+
+struct LocalMapParameters {
+  double body_radius{1.0};       ///< m, horizontally from the robot's base: the robot itself
+  double min_height{0.3};        ///< m, in the base's frame: what is lower is ground
+  double max_scan_range{100.0};  ///< m, from the sensor
+  bool align{true};
+  double align_radius{60.0};      ///< m, of the map that a scan is aligned to
+  double keyframe_distance{1.0};  ///< m, travelled from one alignment to the next
+  double keyframe_angle{0.17};    ///< rad, turned from one alignment to the next
+
+  template <class V>
+  void visit(V& v) {
+    v("body_radius", body_radius, non_negative());
+    v("min_height", min_height, any_number());
+    v("max_scan_range", max_scan_range, positive());
+    v("align", align);
+    v("align_radius", align_radius, positive());
+    v("keyframe_distance", keyframe_distance, positive());
+    v("keyframe_angle", keyframe_angle, positive());
+  }
+  void check(std::vector<std::string>& faults) const;
+};
+
+/// What became of a scan.
+struct ScanReport {
+  std::size_t points{0};
+  std::size_t not_finite{0};
+  std::size_t cut{0};  ///< robot, ground and beyond the range
+  bool is_keyframe{false};
+  Alignment alignment;  ///< kNotTried between keyframes, and where the map is still empty
+  InsertReport insertion;
+  Eigen::Isometry3d base_in_map{Eigen::Isometry3d::Identity()};  ///< with which it was inserted
+};
+
+/// Builds the map of the surroundings from scans (Maier & Kleiner 2010, section IV.A and eq. 5): cut, align at
+/// keyframes, insert. A correction that the alignment finds stays in force until the next one; where an alignment is
+/// not accepted the scan goes in as the guess and the correction so far have it, and the report says so.
+class LocalMap {
+ public:
+  /// Throws ParameterError.
+  LocalMap(const LocalMapParameters& parameters, const VoxelMapParameters& voxel_parameters,
+           const ScanAlignerParameters& aligner_parameters);
+
+  /// `scan` in m in the sensor's frame; `base_in_map` is the odometry's guess for the time of the scan. Nothing is
+  /// inserted where a transform is not finite.
+  ScanReport add_scan(const PointCloud& scan, const Eigen::Isometry3d& sensor_in_base,
+                      const Eigen::Isometry3d& base_in_map);
+
+  /// A prior map, in the map frame.
+  InsertReport add_prior(const PointCloud& points) { return map_.add_points(points); }
+
+  void clear();
+
+  const VoxelMap& map() const { return map_; }
+  /// From the guess's map frame to the map's: identity until an alignment is accepted.
+  const Eigen::Isometry3d& correction() const { return correction_; }
+
+ private:
+  PointCloud cut(const PointCloud& scan, const Eigen::Isometry3d& sensor_in_base, ScanReport& report) const;
+  bool is_keyframe(const Eigen::Isometry3d& base_in_map) const;
+
+  LocalMapParameters parameters_;
+  ScanAlignerParameters aligner_parameters_;
+  VoxelMap map_;
+  Eigen::Isometry3d correction_{Eigen::Isometry3d::Identity()};
+  Eigen::Isometry3d last_keyframe_{Eigen::Isometry3d::Identity()};
+  bool has_keyframe_{false};
+};
+
+}  // namespace urban_gnss

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+
+#include "urban_gnss_localization/occlusion/key_index.hpp"
+
+namespace urban_gnss {
+
+/// The coarse cubes of space that a lidar's rays have passed: what tells free sky from sky never looked at.
+class ObservedSpace {
+ public:
+  /// `edge_m` > 0 is the edge of a cube.
+  explicit ObservedSpace(double edge_m) : edge_m_(edge_m) {}
+
+  /// Marks the cubes from `origin` to the return at `end` (m), both included. Finite arguments.
+  void mark(const Eigen::Vector3d& origin, const Eigen::Vector3d& end);
+
+  /// The share of the ray's length up to `range_m` > 0 that lies in marked cubes. Allocation-free.
+  double known_fraction(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double range_m) const;
+
+  /// Forgets the cubes whose centre is farther than `distance_m` from `center`.
+  void drop_beyond(const Eigen::Vector3d& center, double distance_m);
+
+  void clear() { cubes_.clear(); }
+  std::size_t size() const { return cubes_.size(); }
+  std::size_t memory_bytes() const { return cubes_.memory_bytes(); }
+
+ private:
+  double edge_m_;
+  KeyIndex cubes_;
+};
+
+}  // namespace urban_gnss

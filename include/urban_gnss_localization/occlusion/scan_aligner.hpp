@@ -1,0 +1,102 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstddef>
+#include <limits>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "urban_gnss_localization/common/parameters.hpp"
+#include "urban_gnss_localization/occlusion/point_cloud.hpp"
+
+namespace urban_gnss {
+
+enum class AlignmentFreedom {
+  kPlanar,  ///< x, y and yaw: needs no ground in the clouds, roll and pitch are the guess's
+  kFull,    ///< all six
+};
+EnumNames<AlignmentFreedom> enum_names(AlignmentFreedom);
+
+struct ScanAlignerParameters {
+  AlignmentFreedom freedom{AlignmentFreedom::kPlanar};
+  int max_iterations{15};
+  int max_points{1500};               ///< of the scan, evenly chosen
+  int normal_neighbours{10};          ///< points of the map from which a plane is fitted
+  double max_distance{2.0};           ///< m, to the nearest point of the map, at the first iteration
+  double final_distance{0.8};         ///< m, at the last iteration and for the verdict
+  double inlier_distance{0.2};        ///< m, to the plane
+  double min_inlier_fraction{0.5};    ///< of the points near flat pieces of the map
+  double min_overlap{0.25};           ///< points near flat pieces of the map, of all
+  double max_residual{0.15};          ///< m, RMS of the inliers' distances to their planes
+  double min_conditioning{0.02};      ///< least share of the constraint in any direction; a corridor has none along it
+  double max_correction{2.0};         ///< m, of the guess
+  double max_correction_angle{0.17};  ///< rad
+
+  template <class V>
+  void visit(V& v) {
+    v("freedom", freedom);
+    v("max_iterations", max_iterations, between(1, 1000));
+    v("max_points", max_points, at_least(50));
+    v("normal_neighbours", normal_neighbours, between(4, 50));
+    v("max_distance", max_distance, positive());
+    v("final_distance", final_distance, positive());
+    v("inlier_distance", inlier_distance, positive());
+    v("min_inlier_fraction", min_inlier_fraction, between(0.0, 1.0));
+    v("min_overlap", min_overlap, between(0.0, 1.0));
+    v("max_residual", max_residual, positive());
+    v("min_conditioning", min_conditioning, between(0.0, 1.0));
+    v("max_correction", max_correction, positive());
+    v("max_correction_angle", max_correction_angle, positive());
+  }
+  void check(std::vector<std::string>& faults) const;
+};
+
+enum class AlignmentDecision {
+  kAccepted,
+  kNotTried,      ///< no alignment was asked for
+  kTooFewPoints,  ///< in the scan or in the map
+  kNoOverlap,     ///< too few points of the scan are near flat pieces of the map
+  kDegenerate,    ///< a direction of motion is not constrained
+  kTooFewInliers,
+  kLargeResidual,
+  kLargeCorrection,
+};
+EnumNames<AlignmentDecision> enum_names(AlignmentDecision);
+
+struct Alignment {
+  AlignmentDecision decision{AlignmentDecision::kNotTried};
+  std::string reason;  ///< with the figure that decided; empty where accepted
+  /// Sensor to map; the guess itself unless accepted.
+  Eigen::Isometry3d pose{Eigen::Isometry3d::Identity()};
+  double overlap{0.0};  ///< share of the points near flat pieces of the map
+  double inlier_fraction{0.0};
+  double residual_m{std::numeric_limits<double>::quiet_NaN()};
+  double conditioning{0.0};
+  double correction_m{0.0};
+  double correction_rad{0.0};
+  int iterations{0};
+
+  bool is_accepted() const { return decision == AlignmentDecision::kAccepted; }
+};
+
+/// Point-to-plane ICP (Chen & Medioni 1992) of a scan to a map with a check of its health. Nearest points come from
+/// PCL's kd-tree. The steps are taken here and not by pcl::IterativeClosestPointWithNormals, as that tells neither
+/// which points were inliers nor how well each direction was constrained, which is what the verdict needs.
+class ScanAligner {
+ public:
+  /// `map` (m, map frame) is copied; non-finite points are left out. Throws ParameterError.
+  ScanAligner(const PointCloud& map, const ScanAlignerParameters& parameters);
+  ~ScanAligner();
+
+  /// `scan` in m in the sensor's frame, non-finite points are left out; `guess` takes it to the map frame.
+  Alignment align(const PointCloud& scan, const Eigen::Isometry3d& guess) const;
+
+ private:
+  struct Target;  // keeps PCL's headers out of this one
+  std::unique_ptr<Target> target_;
+  ScanAlignerParameters parameters_;
+};
+
+}  // namespace urban_gnss

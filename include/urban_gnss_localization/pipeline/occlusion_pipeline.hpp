@@ -1,0 +1,154 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <deque>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "urban_gnss_localization/common/stamp.hpp"
+#include "urban_gnss_localization/geometry/pose2.hpp"
+#include "urban_gnss_localization/gnss/gnss_covariance.hpp"
+#include "urban_gnss_localization/occlusion/kd_tree_ray_tracer.hpp"
+#include "urban_gnss_localization/occlusion/local_map.hpp"
+#include "urban_gnss_localization/occlusion/visibility.hpp"
+#include "urban_gnss_localization/occlusion/voxel_ray_tracer.hpp"
+#include "urban_gnss_localization/pipeline/stamp_monitor.hpp"
+
+namespace urban_gnss {
+
+enum class TracerChoice {
+  kVoxel,   ///< the default
+  kKdTree,  ///< Algorithm 2 as printed; rebuilt from the map where that has changed, slow
+};
+EnumNames<TracerChoice> enum_names(TracerChoice);
+
+struct OcclusionParameters {
+  TracerChoice tracer{TracerChoice::kVoxel};
+  std::vector<double> antenna_offset{0.0, 0.0, 0.0};  ///< m, in base_link_frame
+  double antenna_sigma{0.3};        ///< m per horizontal axis: how well the antenna is placed in the map
+  double heading_sigma{0.05};       ///< rad, at least that much is not known of the heading
+  double heading_timeout{5.0};      ///< s, an older heading is not used
+  double satellites_timeout{2.0};   ///< s, older satellites are not used for a fix
+  double map_timeout{60.0};         ///< s without a cloud after which the map is no longer believed
+  int sky_azimuths{72};             ///< directions of the skyline, where there are no satellites and for the sky plot
+  double sky_mask{0.17};            ///< rad, elevation from which the sky counts
+
+  template <class V>
+  void visit(V& v) {
+    v("tracer", tracer);
+    v("antenna_offset", antenna_offset);
+    v("antenna_sigma", antenna_sigma, non_negative());
+    v("heading_sigma", heading_sigma, non_negative());
+    v("heading_timeout", heading_timeout, positive());
+    v("satellites_timeout", satellites_timeout, positive());
+    v("map_timeout", map_timeout, positive());
+    v("sky_azimuths", sky_azimuths, between(8, 720));
+    v("sky_mask", sky_mask, between(0.0, 1.5));
+  }
+  void check(std::vector<std::string>& faults) const;
+};
+
+/// All that the occlusion node can be told.
+struct OcclusionPipelineParameters {
+  OcclusionParameters occlusion;
+  VisibilityParameters visibility;
+  LocalMapParameters local_map;
+  VoxelMapParameters voxels;
+  ScanAlignerParameters aligner;
+  VoxelRayTracerParameters voxel_tracer;
+  GnssCovarianceParameters covariance;
+
+  template <class V>
+  void visit(V& v) {
+    occlusion.visit(v);
+    visibility.visit(v);
+    local_map.visit(v);
+    voxels.visit(v);
+    aligner.visit(v);
+    voxel_tracer.visit(v);
+    covariance.visit(v);
+  }
+  void check(std::vector<std::string>& faults) const;
+};
+
+/// How the odometry frame lies in the world, from a localizer or a compass.
+struct WorldAlignment {
+  Stamp stamp{0};
+  Pose2 odom_in_world;          ///< map -> odom; of it the yaw is used, and the place where there is a prior map
+  double yaw_sigma_rad{0.0};
+};
+
+/// Why a cloud did not go into the map.
+enum class CloudDecision { kInserted, kNotNewer, kEmpty, kNotFinite };
+const char* to_string(CloudDecision decision);
+
+struct CloudOutcome {
+  CloudDecision decision{CloudDecision::kInserted};
+  ScanReport scan;
+};
+
+/// One fix with what the surroundings say of it.
+struct FixAssessment {
+  Stamp stamp{0};
+  GnssCovariance covariance;
+  std::vector<SatelliteObservation> satellites;
+  std::vector<SatelliteVisibility> visibilities;  ///< one for each satellite; of no meaning without map and heading
+  AntennaPose antenna;                            ///< in the map of the surroundings
+  bool has_map{false};                            ///< map, heading and odometry were there for this fix
+  std::string missing;                            ///< what was not, for the user; empty where all was
+};
+
+/// Clouds, satellites and fixes in, honest covariances out (Maier & Kleiner 2010): the map is built in the odometry frame,
+/// whose heading error turns the sky; stamps are those of the messages.
+class OcclusionPipeline {
+ public:
+  /// Requires parameters without faults.
+  explicit OcclusionPipeline(const OcclusionPipelineParameters& parameters);
+
+  /// A cloud in the sensor's frame (m), with the robot's pose in the odometry frame at the cloud's own stamp.
+  CloudOutcome add_cloud(Stamp stamp, const PointCloud& cloud, const Eigen::Isometry3d& sensor_in_base,
+                         const Eigen::Isometry3d& base_in_odom);
+  /// A map that was there before, in the world's axes; turned into the odometry frame by `odom_in_world`.
+  InsertReport add_prior(const PointCloud& points, const Pose2& odom_in_world);
+  /// Ignored where it is not finite.
+  void set_alignment(const WorldAlignment& alignment);
+  /// Angles that are not finite are left out. `angle_resolution_rad`: step that the receiver rounds to; 0 if unknown.
+  void set_satellites(Stamp stamp, std::vector<SatelliteObservation> satellites, double angle_resolution_rad);
+
+  /// A fix with the covariance that its receiver claims (m^2, east and north), and the robot's pose in the odometry frame
+  /// at its stamp, where that is known.
+  FixAssessment assess(Stamp stamp, const std::optional<Eigen::Matrix2d>& claimed,
+                       const std::optional<Eigen::Isometry3d>& base_in_odom);
+
+  /// Starts anew: map, satellites, heading, memory of fixes. For a clock that was set back.
+  void reset();
+  void clear_map();
+
+  const LocalMap& local_map() const { return local_map_; }
+  const OcclusionPipelineParameters& parameters() const { return parameters_; }
+  const RayTracer& tracer() const;
+  /// Blocked elevations around the antenna (skyline()), for each of sky_azimuths steps.
+  std::vector<double> skyline_at(const AntennaPose& antenna) const;
+
+ private:
+  std::optional<AntennaPose> antenna_at(Stamp stamp, const std::optional<Eigen::Isometry3d>& base_in_odom,
+                                        std::string& missing) const;
+  SkyObservation observe_sky(const AntennaPose& antenna) const;
+
+  OcclusionPipelineParameters parameters_;
+  LocalMap local_map_;
+  VoxelRayTracer voxel_tracer_;
+  mutable std::unique_ptr<KdTreeRayTracer> kd_tracer_;  ///< of the map as it is; made when asked for
+  GnssCovarianceModel covariance_;
+  std::optional<Stamp> last_cloud_;
+  std::optional<WorldAlignment> alignment_;
+  bool has_prior_{false};
+  Stamp satellites_stamp_{0};
+  std::vector<SatelliteObservation> satellites_;
+  double angle_resolution_rad_{0.0};
+};
+
+}  // namespace urban_gnss

@@ -1,0 +1,84 @@
+#include "urban_gnss_localization/occlusion/local_map.hpp"
+
+namespace urban_gnss {
+
+void LocalMapParameters::check(std::vector<std::string>& faults) const {
+  if (body_radius >= max_scan_range) faults.push_back("body_radius: must be less than max_scan_range");
+}
+
+LocalMap::LocalMap(const LocalMapParameters& parameters, const VoxelMapParameters& voxel_parameters,
+                   const ScanAlignerParameters& aligner_parameters)
+    : parameters_(parameters), aligner_parameters_(aligner_parameters), map_(voxel_parameters) {
+  std::vector<std::string> faults;
+  parameters.check(faults);
+  aligner_parameters.check(faults);
+  if (!faults.empty()) throw ParameterError("local map", faults);
+}
+
+void LocalMap::clear() {
+  map_.clear();
+  correction_.setIdentity();
+  has_keyframe_ = false;
+}
+
+ScanReport LocalMap::add_scan(const PointCloud& scan, const Eigen::Isometry3d& sensor_in_base,
+                              const Eigen::Isometry3d& base_in_map) {
+  ScanReport report;
+  report.points = scan.size();
+  if (!sensor_in_base.matrix().allFinite() || !base_in_map.matrix().allFinite()) {
+    report.alignment.reason = "the transform of the scan is not finite";
+    report.insertion.points = report.insertion.unusable = scan.size();
+    return report;
+  }
+  const PointCloud kept = cut(scan, sensor_in_base, report);
+  const Eigen::Isometry3d guess = correction_ * base_in_map;
+  Eigen::Isometry3d sensor_in_map = guess * sensor_in_base;
+  report.is_keyframe = is_keyframe(base_in_map);
+  if (report.is_keyframe) {
+    if (parameters_.align && map_.size() > 0) {
+      const PointCloud nearby = map_.points_within(sensor_in_map.translation(), parameters_.align_radius);
+      const PointCloud thinned = voxel_filtered(kept, map_.parameters().voxel_size);
+      report.alignment = ScanAligner(nearby, aligner_parameters_).align(thinned, sensor_in_map);
+      if (report.alignment.is_accepted()) {
+        sensor_in_map = report.alignment.pose;
+        correction_ = sensor_in_map * sensor_in_base.inverse() * base_in_map.inverse();
+      }
+    }
+    last_keyframe_ = base_in_map;
+    has_keyframe_ = true;
+  }
+  report.base_in_map = sensor_in_map * sensor_in_base.inverse();
+  report.insertion = map_.add_scan(transformed(kept, sensor_in_map), sensor_in_map.translation());
+  return report;
+}
+
+PointCloud LocalMap::cut(const PointCloud& scan, const Eigen::Isometry3d& sensor_in_base, ScanReport& report) const {
+  const Eigen::Isometry3f to_base = sensor_in_base.cast<float>();
+  const auto body_m = static_cast<float>(parameters_.body_radius);
+  const auto min_height_m = static_cast<float>(parameters_.min_height);
+  const auto max_range_m = static_cast<float>(parameters_.max_scan_range);
+  PointCloud kept;
+  kept.reserve(scan.size());
+  for (const Eigen::Vector3f& point : scan) {
+    if (!point.allFinite()) {
+      ++report.not_finite;
+      continue;
+    }
+    const Eigen::Vector3f in_base = to_base * point;
+    if (in_base.z() < min_height_m || in_base.head<2>().norm() < body_m || point.norm() > max_range_m) {
+      ++report.cut;
+      continue;
+    }
+    kept.push_back(point);
+  }
+  return kept;
+}
+
+bool LocalMap::is_keyframe(const Eigen::Isometry3d& base_in_map) const {
+  if (!has_keyframe_) return true;
+  const Eigen::Isometry3d since = last_keyframe_.inverse() * base_in_map;
+  return since.translation().norm() >= parameters_.keyframe_distance ||
+         Eigen::AngleAxisd(since.linear()).angle() >= parameters_.keyframe_angle;
+}
+
+}  // namespace urban_gnss

@@ -1,0 +1,118 @@
+#include "urban_gnss_localization/occlusion/point_cloud.hpp"
+
+#include <pcl/io/pcd_io.h>
+#include <pcl/kdtree/kdtree_flann.h>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "pcl_cloud.hpp"
+#include "urban_gnss_localization/occlusion/key_index.hpp"
+#include "urban_gnss_localization/occlusion/voxel_walk.hpp"
+
+namespace urban_gnss {
+
+PointCloud finite_points(const PointCloud& cloud) {
+  PointCloud finite;
+  finite.reserve(cloud.size());
+  std::copy_if(cloud.begin(), cloud.end(), std::back_inserter(finite),
+               [](const Eigen::Vector3f& point) { return point.allFinite(); });
+  return finite;
+}
+
+PointCloud transformed(const PointCloud& cloud, const Eigen::Isometry3d& transform) {
+  const Eigen::Isometry3f single = transform.cast<float>();
+  PointCloud result;
+  result.reserve(cloud.size());
+  for (const Eigen::Vector3f& point : cloud) result.push_back(single * point);
+  return result;
+}
+
+PointCloud voxel_filtered(const PointCloud& cloud, double edge_m) {
+  constexpr float kFarthestM = 1e5F;
+  const double farthest = std::min<double>(kFarthestM, kMaxVoxelCoordinate * edge_m);
+  KeyIndex index;
+  PointCloud sums;
+  std::vector<int> counts;
+  for (const Eigen::Vector3f& point : cloud) {
+    if (!(point.cwiseAbs().maxCoeff() < farthest) || !point.allFinite()) continue;
+    const auto key = voxel_key(voxel_of(point.cast<double>(), 1.0 / edge_m));
+    const auto fresh = static_cast<KeyIndex::Index>(sums.size());
+    const auto slot = index.find_or_insert(key, fresh);
+    if (slot == fresh) {
+      sums.emplace_back(Eigen::Vector3f::Zero());
+      counts.push_back(0);
+    }
+    sums[slot] += point;
+    ++counts[slot];
+  }
+  for (std::size_t i = 0; i < sums.size(); ++i) sums[i] /= static_cast<float>(counts[i]);
+  return sums;
+}
+
+double sample_spacing_m(const PointCloud& cloud) {
+  constexpr std::size_t kSamples = 5000;
+  constexpr int kNeighbours = 12;  // of which some may be copies
+  constexpr std::size_t kRank = 4;
+  const PointCloud finite = finite_points(cloud);
+  if (finite.size() <= kRank) return 0.0;
+  pcl::KdTreeFLANN<pcl::PointXYZ> tree;
+  const auto points = to_pcl(finite);
+  tree.setInputCloud(points);
+  const std::size_t stride = finite.size() / kSamples + 1;
+  std::vector<float> distances;
+  std::vector<int> neighbours;
+  std::vector<float> squared;
+  for (std::size_t i = 0; i < finite.size(); i += stride) {
+    const int found = tree.nearestKSearch((*points)[i], kNeighbours, neighbours, squared);
+    PointCloud others;
+    for (int k = 0; k < found && others.size() < kRank; ++k) {
+      const Eigen::Vector3f& candidate = finite[static_cast<std::size_t>(neighbours[static_cast<std::size_t>(k)])];
+      const auto is_copy = [&](const Eigen::Vector3f& other) { return other == candidate; };
+      if (candidate == finite[i] || std::any_of(others.begin(), others.end(), is_copy)) continue;
+      others.push_back(candidate);
+    }
+    if (others.size() == kRank) distances.push_back((others.back() - finite[i]).norm());
+  }
+  if (distances.empty()) return 0.0;
+  const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
+  std::nth_element(distances.begin(), middle, distances.end());
+  return *middle;
+}
+
+PointCloud read_pcd(const std::string& path) {
+  // PCL reads on where the header has made no sense, and crashes.
+  pcl::PCLPointCloud2 header;
+  const bool has_header = pcl::PCDReader().readHeader(path, header) == 0;
+  for (const char* name : {"x", "y", "z"}) {
+    const auto is_coordinate = [&](const pcl::PCLPointField& field) {
+      return field.name == name && field.datatype == pcl::PCLPointField::FLOAT32;
+    };
+    if (!has_header || std::none_of(header.fields.begin(), header.fields.end(), is_coordinate)) {
+      throw std::runtime_error(path + ": is not a .pcd file with x, y and z in single precision");
+    }
+  }
+  pcl::PointCloud<pcl::PointXYZ> points;
+  try {
+    if (pcl::io::loadPCDFile(path, points) < 0) throw std::runtime_error(path + ": cannot be read as a .pcd file");
+  } catch (const pcl::PCLException& error) {
+    throw std::runtime_error(path + ": " + error.what());
+  }
+  PointCloud cloud;
+  cloud.reserve(points.size());
+  for (const pcl::PointXYZ& point : points) cloud.emplace_back(point.x, point.y, point.z);
+  return cloud;
+}
+
+void write_pcd(const std::string& path, const PointCloud& cloud) {
+  const auto points = to_pcl(cloud);
+  if (points->empty()) throw std::runtime_error(path + ": an empty cloud is not written");
+  try {
+    if (pcl::io::savePCDFileBinary(path, *points) == 0) return;
+  } catch (const pcl::IOException&) {
+  }
+  throw std::runtime_error(path + ": cannot be written");
+}
+
+}  // namespace urban_gnss

@@ -1,0 +1,300 @@
+#include "urban_gnss_localization/occlusion/voxel_map.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace urban_gnss {
+namespace {
+
+/// In voxel edges: nearer than this a followed ray meets a voxel's mean. The same for those that end there and those
+/// that go on, so that it leaves their ratio alone.
+constexpr double kMeetingDistance = 0.35;
+
+/// The window's border is attended to after each such share of it.
+constexpr double kDropInterval = 0.05;
+
+/// Beyond max_voxels so much more is dropped, so that it does not happen at every scan.
+constexpr double kLimitReserve = 0.1;
+
+static_assert(VoxelMap::kCellVoxels == 4);
+
+VoxelCoordinates cell_of(const VoxelCoordinates& voxel) {
+  return {voxel.x() >> 2, voxel.y() >> 2, voxel.z() >> 2};  // rounds down below zero, too
+}
+
+std::uint64_t bit_in_cell(const VoxelCoordinates& voxel) {
+  const auto bits = [&](int level) {
+    return (voxel.x() >> level & 1) | (voxel.y() >> level & 1) << 1 | (voxel.z() >> level & 1) << 2;
+  };
+  return std::uint64_t{1} << static_cast<unsigned>(8 * bits(1) + bits(0));
+}
+
+/// How many of a cell's voxels come before this one.
+VoxelMap::Index rank(std::uint64_t mask, std::uint64_t bit) {
+  return static_cast<VoxelMap::Index>(__builtin_popcountll(mask & (bit - 1)));
+}
+
+/// Calls visit(dx, dy, dz) for a cell and its neighbours.
+template <class Visit>
+void for_each_nearby(Visit&& visit) {
+  for (int x = -1; x <= 1; ++x) {
+    for (int y = -1; y <= 1; ++y) {
+      for (int z = -1; z <= 1; ++z) visit(x, y, z);
+    }
+  }
+}
+
+}  // namespace
+
+VoxelMap::VoxelMap(const VoxelMapParameters& parameters)
+    : parameters_(parameters),
+      inverse_voxel_(1.0 / parameters.voxel_size),
+      cell_edge_m_(kCellVoxels * parameters.voxel_size),
+      // Some cells less than the keys allow, so that neighbours of cells have keys, too. 100 km is far from any datum.
+      farthest_m_(static_cast<float>(std::min(1e5, (kMaxVoxelCoordinate - 100) * parameters.voxel_size))),
+      observed_(parameters.observed_cell) {
+  std::vector<std::string> faults;
+  parameters.check(faults);
+  if (!(parameters.voxel_size > 0.0)) faults.push_back("voxel_size: must be positive");
+  if (!faults.empty()) throw ParameterError("voxel map", faults);
+}
+
+void VoxelMap::clear() { *this = VoxelMap(parameters_); }
+
+InsertReport VoxelMap::add_scan(const PointCloud& points, const Eigen::Vector3d& sensor) {
+  InsertReport report;
+  report.points = points.size();
+  if (!sensor.allFinite() || sensor.cwiseAbs().maxCoeff() > farthest_m_) {
+    report.unusable = points.size();
+    return report;
+  }
+  for (const Eigen::Vector3f& point : points) add_point(point, report);
+  // The phase runs on from scan to scan, so that it is not always the same beams that are followed.
+  const auto stride = static_cast<std::size_t>(parameters_.ray_stride);
+  for (std::size_t i = ray_phase_ % stride; i < points.size(); i += stride) {
+    const Eigen::Vector3d end = points[i].cast<double>();
+    if (end.allFinite() && end.cwiseAbs().maxCoeff() < farthest_m_) follow_ray(sensor, end);
+  }
+  ray_phase_ = (ray_phase_ + 7) % stride;
+  if (!((sensor - last_drop_).norm() < kDropInterval * parameters_.window)) {
+    report.dropped_by_window = drop_beyond(sensor, parameters_.window);
+    observed_.drop_beyond(sensor, parameters_.window);
+    last_drop_ = sensor;
+  }
+  report.dropped_by_limit = limit_size(sensor);
+  return report;
+}
+
+InsertReport VoxelMap::add_points(const PointCloud& points) {
+  InsertReport report;
+  report.points = points.size();
+  for (const Eigen::Vector3f& point : points) add_point(point, report);
+  if (!bounds_.isEmpty()) report.dropped_by_limit = limit_size(bounds_.center());
+  return report;
+}
+
+void VoxelMap::add_point(const Eigen::Vector3f& point, InsertReport& report) {
+  if (!point.allFinite() || !(point.cwiseAbs().maxCoeff() < farthest_m_)) {
+    ++report.unusable;
+    return;
+  }
+  const VoxelCoordinates coordinates = voxel_of(point.cast<double>(), inverse_voxel_);
+  const VoxelCoordinates cell_coordinates = cell_of(coordinates);
+  const std::uint64_t bit = bit_in_cell(coordinates);
+  const Index found = find_cell(cell_coordinates);
+  if (found != kNone && (cells_[found].mask & bit) != 0) {
+    const Index voxel = cells_[found].begin + rank(cells_[found].mask, bit);
+    // The mean follows at least every thousandth return, so that an old voxel is not deaf.
+    const std::uint32_t count = std::min(++counts_[voxel].returns, 1000U);
+    surface_[voxel].mean += (point - surface_[voxel].mean) / static_cast<float>(count);
+    return;
+  }
+  ++report.new_voxels;
+  ++size_;
+  bounds_.extend(point.cast<double>());
+  Cell& cell = cells_[found != kNone && cells_[found].mask != 0 ? found : occupy(cell_coordinates)];
+  if (cell.count == 0 || cell.count == room(cell.size_class)) {
+    const std::size_t size_class = cell.count == 0 ? 0 : cell.size_class + 1U;
+    const Index begin = take_block(size_class);
+    for (Index i = 0; i < cell.count; ++i) copy_voxel(cell.begin + i, begin + i);
+    if (cell.count > 0) unused_blocks_[cell.size_class].push_back(cell.begin);
+    cell.begin = begin;
+    cell.size_class = static_cast<std::uint8_t>(size_class);
+  }
+  const Index voxel = cell.begin + rank(cell.mask, bit);
+  for (Index i = cell.begin + cell.count; i > voxel; --i) copy_voxel(i - 1, i);
+  surface_[voxel] = {point, 0.0F};
+  counts_[voxel] = {1, 0, 0};
+  cell.mask |= bit;
+  ++cell.count;
+}
+
+VoxelMap::Index VoxelMap::occupy(const VoxelCoordinates& center) {
+  for_each_nearby([&](int x, int y, int z) {
+    const auto fresh = unused_cells_.empty() ? static_cast<Index>(cells_.size()) : unused_cells_.back();
+    const Index cell = cell_index_.find_or_insert(voxel_key(center + VoxelCoordinates(x, y, z)), fresh);
+    if (cell == fresh) {
+      if (unused_cells_.empty()) {
+        cells_.emplace_back();
+      } else {
+        cells_[cell] = {};
+        unused_cells_.pop_back();
+      }
+    }
+    cells_[cell].nearby |= nearby_bit(-x, -y, -z);
+  });
+  return find_cell(center);
+}
+
+void VoxelMap::release(const VoxelCoordinates& center) {
+  for_each_nearby([&](int x, int y, int z) {
+    const auto key = voxel_key(center + VoxelCoordinates(x, y, z));
+    const Index cell = cell_index_.find(key);
+    cells_[cell].nearby &= ~nearby_bit(-x, -y, -z);
+    if (cells_[cell].nearby != 0) return;
+    cell_index_.erase(key);
+    unused_cells_.push_back(cell);
+  });
+}
+
+VoxelMap::Index VoxelMap::take_block(std::size_t size_class) {
+  auto& unused = unused_blocks_[size_class];
+  if (!unused.empty()) {
+    const Index begin = unused.back();
+    unused.pop_back();
+    return begin;
+  }
+  const std::size_t begin = surface_.size();
+  const std::size_t size = begin + room(size_class);
+  surface_.resize(size);
+  counts_.resize(size);
+  return static_cast<Index>(begin);
+}
+
+void VoxelMap::copy_voxel(Index from, Index to) {
+  surface_[to] = surface_[from];
+  counts_[to] = counts_[from];
+}
+
+void VoxelMap::follow_ray(const Eigen::Vector3d& sensor, const Eigen::Vector3d& end) {
+  observed_.mark(sensor, end);
+  const double length_m = (end - sensor).norm();
+  if (length_m < parameters_.voxel_size) return;
+  const Eigen::Vector3d direction = (end - sensor) / length_m;
+  const double meeting_m = kMeetingDistance * parameters_.voxel_size;
+  const auto meets = [&](Index voxel) {
+    return surface_[voxel].mean.cast<double>().cwiseEqual(end).all() ||
+           direction.cross(surface_[voxel].mean.cast<double>() - sensor).squaredNorm() < meeting_m * meeting_m;
+  };
+  const Index last = find_voxel(voxel_of(end, inverse_voxel_));
+  if (last != kNone && meets(last)) count_meeting(last, &Counts::hits);
+  // Up to shortly before the return: noise of the range must not make a wall's own returns pass through it.
+  const double pass_end_m = length_m - 2.0 * parameters_.voxel_size;
+  walk_voxels(sensor, direction, 0.0, pass_end_m, cell_edge_m_, [&](const auto& cell, double from_m, double to_m) {
+    const Index found = find_cell(cell);
+    if (found == kNone || cells_[found].mask == 0) return true;
+    walk_voxels(sensor, direction, from_m, to_m, parameters_.voxel_size, [&](const auto& coordinates, double, double) {
+      const Index voxel = find_voxel(coordinates);
+      if (voxel != kNone && voxel != last && meets(voxel)) count_meeting(voxel, &Counts::passes);
+      return true;
+    });
+    return true;
+  });
+}
+
+void VoxelMap::count_meeting(Index voxel, std::uint32_t Counts::*kind) {
+  Counts& counts = counts_[voxel];
+  ++(counts.*kind);
+  const std::uint32_t met = counts.passes + counts.hits;
+  if (met >= kMinEvidence) {
+    surface_[voxel].permeability = static_cast<float>(counts.passes) / static_cast<float>(met);
+  }
+}
+
+template <class Visit>
+void VoxelMap::for_each_voxel(Visit&& visit) const {
+  for (const Cell& cell : cells_) {
+    for (Index voxel = cell.begin; voxel != cell.begin + cell.count; ++voxel) visit(voxel);
+  }
+}
+
+std::size_t VoxelMap::drop_beyond(const Eigen::Vector3d& center, double distance_m) {
+  const Eigen::Vector3f single = center.cast<float>();
+  const auto limit = static_cast<float>(distance_m * distance_m);
+  const std::size_t size_before = size_;
+  std::vector<VoxelCoordinates> emptied;
+  bounds_.setEmpty();
+  cell_index_.for_each([&](KeyIndex::Key key, Index index) {
+    Cell& cell = cells_[index];
+    if (cell.count == 0) return;
+    Index kept = cell.begin;
+    Index voxel = cell.begin;
+    for (std::uint64_t rest = cell.mask; rest != 0; rest &= rest - 1, ++voxel) {
+      if ((surface_[voxel].mean - single).squaredNorm() > limit) {
+        cell.mask &= ~(rest & (~rest + 1));  // the lowest bit of what remains
+        continue;
+      }
+      bounds_.extend(surface_[voxel].mean.cast<double>());
+      copy_voxel(voxel, kept++);
+    }
+    size_ -= voxel - kept;
+    cell.count = static_cast<std::uint8_t>(kept - cell.begin);
+    if (cell.count > 0) return;
+    unused_blocks_[cell.size_class].push_back(cell.begin);
+    emptied.push_back(voxel_of_key(key));
+  });
+  for (const VoxelCoordinates& cell : emptied) release(cell);
+  return size_before - size_;
+}
+
+std::size_t VoxelMap::limit_size(const Eigen::Vector3d& center) {
+  const auto allowed = static_cast<std::size_t>(parameters_.max_voxels);
+  if (size() <= allowed) return 0;
+  const auto kept = static_cast<std::size_t>((1.0 - kLimitReserve) * static_cast<double>(allowed));
+  const Eigen::Vector3f single = center.cast<float>();
+  std::vector<float> distances;
+  distances.reserve(size());
+  for_each_voxel([&](Index voxel) { distances.push_back((surface_[voxel].mean - single).norm()); });
+  const auto border = distances.begin() + static_cast<std::ptrdiff_t>(kept);
+  std::nth_element(distances.begin(), border, distances.end());
+  // A little nearer than the first that has to go: it goes with all that are as far.
+  return drop_beyond(center, *border * (1.0 - 1e-6));
+}
+
+VoxelMap::Index VoxelMap::find(const Eigen::Vector3d& point) const {
+  if (!point.allFinite() || point.cwiseAbs().maxCoeff() > farthest_m_) return kNone;
+  return find_voxel(voxel_of(point, inverse_voxel_));
+}
+
+VoxelMap::Index VoxelMap::find_voxel(const VoxelCoordinates& voxel) const {
+  const Index cell = find_cell(cell_of(voxel));
+  const std::uint64_t bit = bit_in_cell(voxel);
+  if (cell == kNone || (cells_[cell].mask & bit) == 0) return kNone;
+  return cells_[cell].begin + rank(cells_[cell].mask, bit);
+}
+
+PointCloud VoxelMap::points_within(const Eigen::Vector3d& center, double radius_m) const {
+  const Eigen::Vector3f single = center.cast<float>();
+  const auto limit = static_cast<float>(radius_m * radius_m);
+  PointCloud found;
+  for_each_voxel([&](Index voxel) {
+    if ((surface_[voxel].mean - single).squaredNorm() <= limit) found.push_back(surface_[voxel].mean);
+  });
+  return found;
+}
+
+PointCloud VoxelMap::points() const {
+  PointCloud all;
+  all.reserve(size());
+  for_each_voxel([&](Index voxel) { all.push_back(surface_[voxel].mean); });
+  return all;
+}
+
+std::size_t VoxelMap::memory_bytes() const {
+  std::size_t indices = unused_cells_.capacity();
+  for (const auto& unused : unused_blocks_) indices += unused.capacity();
+  return cell_index_.memory_bytes() + observed_.memory_bytes() + cells_.capacity() * sizeof(Cell) +
+         surface_.capacity() * (sizeof(Surface) + sizeof(Counts)) + indices * sizeof(Index);
+}
+
+}  // namespace urban_gnss

@@ -1,0 +1,198 @@
+#include "urban_gnss_localization/pipeline/occlusion_pipeline.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "urban_gnss_localization/geometry/angles.hpp"
+
+namespace urban_gnss {
+namespace {
+
+Eigen::Isometry3d to_isometry(const Pose2& pose) {
+  Eigen::Isometry3d isometry = Eigen::Isometry3d::Identity();
+  isometry.translate(Eigen::Vector3d(pose.x, pose.y, 0.0));
+  isometry.rotate(Eigen::AngleAxisd(pose.yaw, Eigen::Vector3d::UnitZ()));
+  return isometry;
+}
+
+bool is_usable(const SatelliteObservation& satellite) {
+  return satellite.tracked && std::isfinite(satellite.look.azimuth_rad) && satellite.look.elevation_rad > 0.0 &&
+         satellite.look.elevation_rad <= 0.5 * kPi + 1e-6;
+}
+
+void append(std::string& text, const std::string& more) { text += (text.empty() ? "" : ", ") + more; }
+
+}  // namespace
+
+EnumNames<TracerChoice> enum_names(TracerChoice) {
+  return {{"voxel", TracerChoice::kVoxel}, {"kdtree", TracerChoice::kKdTree}};
+}
+
+const char* to_string(CloudDecision decision) {
+  switch (decision) {
+    case CloudDecision::kInserted: return "inserted";
+    case CloudDecision::kNotNewer: return "not newer than the cloud before it";
+    case CloudDecision::kEmpty: return "no point in reach";
+    case CloudDecision::kNotFinite: return "transform not finite";
+  }
+  return "?";
+}
+
+void OcclusionParameters::check(std::vector<std::string>& faults) const {
+  if (antenna_offset.size() != 3) faults.push_back("antenna_offset: must be x, y and z (m)");
+}
+
+void OcclusionPipelineParameters::check(std::vector<std::string>& faults) const {
+  occlusion.check(faults);
+  visibility.check(faults);
+  local_map.check(faults);
+  voxels.check(faults);
+  aligner.check(faults);
+  voxel_tracer.check(faults);
+  covariance.check(faults);
+}
+
+OcclusionPipeline::OcclusionPipeline(const OcclusionPipelineParameters& parameters)
+    : parameters_(parameters),
+      local_map_(parameters.local_map, parameters.voxels, parameters.aligner),
+      voxel_tracer_(local_map_.map(), parameters.voxel_tracer),
+      covariance_(parameters.covariance) {}
+
+CloudOutcome OcclusionPipeline::add_cloud(Stamp stamp, const PointCloud& cloud, const Eigen::Isometry3d& sensor_in_base,
+                                          const Eigen::Isometry3d& base_in_odom) {
+  CloudOutcome outcome;
+  if (last_cloud_ && stamp <= *last_cloud_) {
+    outcome.decision = CloudDecision::kNotNewer;
+    return outcome;
+  }
+  if (!sensor_in_base.matrix().allFinite() || !base_in_odom.matrix().allFinite()) {
+    outcome.decision = CloudDecision::kNotFinite;
+    return outcome;
+  }
+  outcome.scan = local_map_.add_scan(cloud, sensor_in_base, base_in_odom);
+  kd_tracer_.reset();
+  if (outcome.scan.insertion.points == outcome.scan.insertion.unusable) {
+    outcome.decision = CloudDecision::kEmpty;  // nothing was seen, so the map is no younger for it
+    return outcome;
+  }
+  last_cloud_ = stamp;
+  return outcome;
+}
+
+InsertReport OcclusionPipeline::add_prior(const PointCloud& points, const Pose2& odom_in_world) {
+  has_prior_ = true;
+  kd_tracer_.reset();
+  return local_map_.add_prior(transformed(points, to_isometry(inverse(odom_in_world))));
+}
+
+void OcclusionPipeline::set_alignment(const WorldAlignment& alignment) {
+  if (!is_finite(alignment.odom_in_world) || !std::isfinite(alignment.yaw_sigma_rad)) return;
+  alignment_ = alignment;
+}
+
+void OcclusionPipeline::set_satellites(Stamp stamp, std::vector<SatelliteObservation> satellites,
+                                       double angle_resolution_rad) {
+  satellites_stamp_ = stamp;
+  satellites_ = std::move(satellites);
+  angle_resolution_rad_ = std::isfinite(angle_resolution_rad) ? std::max(0.0, angle_resolution_rad) : 0.0;
+}
+
+const RayTracer& OcclusionPipeline::tracer() const {
+  if (parameters_.occlusion.tracer == TracerChoice::kVoxel) return voxel_tracer_;
+  if (!kd_tracer_) {
+    KdTreeRayTracerParameters parameters;
+    parameters.min_range = parameters_.voxel_tracer.min_range;
+    parameters.max_range = parameters_.voxel_tracer.max_range;
+    kd_tracer_ = std::make_unique<KdTreeRayTracer>(local_map_.map().points(), parameters);
+  }
+  return *kd_tracer_;
+}
+
+std::optional<AntennaPose> OcclusionPipeline::antenna_at(Stamp stamp,
+                                                         const std::optional<Eigen::Isometry3d>& base_in_odom,
+                                                         std::string& missing) const {
+  const OcclusionParameters& p = parameters_.occlusion;
+  if (!last_cloud_ && !has_prior_) {
+    append(missing, "clouds");
+  } else if (!has_prior_ && to_seconds(stamp - *last_cloud_) > p.map_timeout) {
+    append(missing, "a recent cloud");
+  }
+  if (!base_in_odom || !base_in_odom->matrix().allFinite()) append(missing, "the robot's pose in the odometry frame");
+  if (!alignment_ || std::abs(to_seconds(stamp - alignment_->stamp)) > p.heading_timeout) append(missing, "a heading");
+  if (!missing.empty()) return std::nullopt;
+
+  AntennaPose antenna;
+  const Eigen::Vector3d offset(p.antenna_offset[0], p.antenna_offset[1], p.antenna_offset[2]);
+  antenna.position = local_map_.correction() * *base_in_odom * offset;
+  antenna.position_sigma_m = p.antenna_sigma;
+  const Eigen::Vector3d corrected_x = local_map_.correction().linear() * Eigen::Vector3d::UnitX();
+  antenna.east_yaw_rad = wrap_angle(std::atan2(corrected_x.y(), corrected_x.x()) - alignment_->odom_in_world.yaw);
+  antenna.east_yaw_sigma_rad = std::max(p.heading_sigma, alignment_->yaw_sigma_rad);
+  return antenna;
+}
+
+std::vector<double> OcclusionPipeline::skyline_at(const AntennaPose& antenna) const {
+  constexpr double kStep_rad = 3.0 * kPi / 180.0;
+  return skyline(tracer(), antenna, parameters_.occlusion.sky_azimuths, kStep_rad);
+}
+
+/// By solid angle, of the sky above sky_mask.
+SkyObservation OcclusionPipeline::observe_sky(const AntennaPose& antenna) const {
+  const double mask_sine = std::sin(parameters_.occlusion.sky_mask);
+  SkyObservation sky;
+  const std::vector<double> elevations = skyline_at(antenna);
+  for (const double elevation : elevations) {
+    sky.blocked_fraction += std::max(0.0, std::sin(elevation) - mask_sine) / (1.0 - mask_sine);
+  }
+  sky.blocked_fraction /= static_cast<double>(elevations.size());
+  sky.known_fraction = 1.0;
+  return sky;
+}
+
+FixAssessment OcclusionPipeline::assess(Stamp stamp, const std::optional<Eigen::Matrix2d>& claimed,
+                                        const std::optional<Eigen::Isometry3d>& base_in_odom) {
+  FixAssessment assessment;
+  assessment.stamp = stamp;
+  const bool has_satellites =
+      !satellites_.empty() &&
+      std::abs(to_seconds(stamp - satellites_stamp_)) <= parameters_.occlusion.satellites_timeout;
+  if (has_satellites) assessment.satellites = satellites_;
+  const auto antenna = antenna_at(stamp, base_in_odom, assessment.missing);
+  if (!has_satellites) append(assessment.missing, "satellites");
+  assessment.visibilities.resize(assessment.satellites.size());
+  std::optional<SkyObservation> sky;
+  if (antenna) {
+    assessment.has_map = true;
+    assessment.antenna = *antenna;
+    for (std::size_t i = 0; i < assessment.satellites.size(); ++i) {
+      SatelliteObservation& satellite = assessment.satellites[i];
+      if (!is_usable(satellite)) continue;
+      assessment.visibilities[i] =
+          assess_visibility(tracer(), local_map_.map().observed_space(), *antenna, satellite.look,
+                            angle_resolution_rad_, parameters_.visibility);
+      satellite.blocked_fraction = assessment.visibilities[i].blocked_fraction;
+      satellite.known_fraction = assessment.visibilities[i].known_fraction;
+    }
+    if (!has_satellites) sky = observe_sky(*antenna);
+  }
+  assessment.covariance = covariance_.process(assessment.satellites, sky, claimed);
+  return assessment;
+}
+
+void OcclusionPipeline::clear_map() {
+  local_map_.clear();
+  kd_tracer_.reset();
+  last_cloud_.reset();
+  has_prior_ = false;
+}
+
+void OcclusionPipeline::reset() {
+  clear_map();
+  covariance_.reset();
+  alignment_.reset();
+  satellites_.clear();
+}
+
+}  // namespace urban_gnss
