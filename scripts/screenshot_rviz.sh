@@ -10,6 +10,8 @@
 #     'm.header.stamp.to_sec() > 8 and m.pose.pose.position.x < -13' demo.launch real_time_factor:=0.2
 #   screenshot_rviz.sh docs/rviz_replay.png /odometry/filtered 'm.header.stamp.to_sec() > 95806' \
 #     replay.launch rate:=6 bag:=/path/to/hk_tst_20210517_ublox.bag
+#   screenshot_rviz.sh docs/rviz_city.png /ground_truth/odom 'm.header.stamp.to_sec() > 1777863640' \
+#     demo.launch scenario:=downtown_grid
 #
 # Without a graphics card rviz draws a few frames a second: a slow simulation or bag keeps its displays in step.
 set -eo pipefail

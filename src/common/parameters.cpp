@@ -43,6 +43,23 @@ std::string Range::describe() const {
 
 bool ParameterReader::has(const std::string& name) const { return map_.IsMap() && map_[name].IsDefined(); }
 
+YAML::Node ParameterReader::child(const std::string& name) {
+  known_.insert(name);
+  return has(name) ? map_[name] : YAML::Node();
+}
+
+std::string ParameterReader::at(const YAML::Node& place) const {
+  if (source_.empty()) return "";
+  const int line = place.Mark().line;  // from 0; negative where the node was not read from a text
+  return source_ + (line >= 0 ? ":" + std::to_string(line + 1) : "") + ": ";
+}
+
+std::string ParameterReader::at(const std::string& name) const { return at(has(name) ? map_[name] : map_); }
+
+void ParameterReader::bad_value(const std::string& name, const std::string& fault) {
+  faults_.push_back(at(name) + path_ + name + " = " + text(name) + ": " + fault);
+}
+
 std::string ParameterReader::text(const std::string& name) const {
   if (!has(name)) return "(default)";
   YAML::Emitter out;
@@ -56,11 +73,14 @@ std::string ParameterReader::text(const std::string& name) const {
 
 std::vector<std::string> ParameterReader::finish() const {
   std::vector<std::string> faults = faults_;
-  if (!map_.IsNull() && !map_.IsMap()) faults.push_back("parameters must be a map of names to values");
+  if (!map_.IsNull() && !map_.IsMap()) {
+    const std::string name = path_.empty() ? "parameters" : path_.substr(0, path_.find_last_not_of('.') + 1);
+    faults.push_back(at(map_) + name + " must be a map of names to values");
+  }
   if (!map_.IsMap()) return faults;
   for (const auto& entry : map_) {
     if (!entry.first.IsScalar()) {
-      faults.push_back("a parameter's name must be a text");
+      faults.push_back(at(entry.first) + "a parameter's name must be a text");
       continue;
     }
     const auto name = entry.first.Scalar();
@@ -69,7 +89,8 @@ std::vector<std::string> ParameterReader::finish() const {
       return edit_distance(name, a) < edit_distance(name, b);
     });
     const bool is_near = nearest != known_.end() && edit_distance(name, *nearest) <= 1 + name.size() / 3;
-    faults.push_back(name + ": no such parameter" + (is_near ? "; did you mean " + *nearest + "?" : ""));
+    faults.push_back(at(entry.first) + path_ + name + ": no such parameter" +
+                     (is_near ? "; did you mean " + *nearest + "?" : ""));
   }
   return faults;
 }

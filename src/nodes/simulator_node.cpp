@@ -1,41 +1,42 @@
-// Simulates the field of Nishida et al., section 4.1: cmd_vel in; odom, gps/fix, ground truth, tf odom -> base_link,
-// markers and (optionally) the clock out. Parameters: PaperFieldParameters, MotionParameters, DatumParameters' datum,
-// Frames and the ones below; config/paper_field/simulator.yaml documents each.
+// Simulates a robot and what surrounds it: cmd_vel in; odom, imu/data, gps/fix, gps/satellites, points, ground truth,
+// tf, markers and (optionally) the clock out. The world is either a city, read from a scenario file
+// (docs/simulator.md), or the field of Nishida et al., section 4.1, whose parameters are PaperFieldParameters and
+// MotionParameters (config/paper_field/simulator.yaml). The node's own parameters are below and SimulationFrames.
 
 #include <geometry_msgs/Twist.h>
-#include <geometry_msgs/Vector3Stamped.h>
-#include <nav_msgs/Odometry.h>
 #include <ros/callback_queue.h>
+#include <ros/package.h>
 #include <ros/ros.h>
 #include <rosgraph_msgs/Clock.h>
-#include <sensor_msgs/NavSatFix.h>
-#include <std_msgs/Bool.h>
-#include <tf2_ros/transform_broadcaster.h>
+#include <tf2_msgs/TFMessage.h>
 #include <visualization_msgs/MarkerArray.h>
 
 #include <cmath>
+#include <map>
 
-#include "urban_gnss_localization/geometry/local_frame.hpp"
-#include "urban_gnss_localization/ros/conversions.hpp"
+#include "urban_gnss_localization/ros/city_markers.hpp"
 #include "urban_gnss_localization/ros/markers.hpp"
 #include "urban_gnss_localization/ros/node_parameters.hpp"
-#include "urban_gnss_localization/ros/topics.hpp"
-#include "urban_gnss_localization/simulation/paper_field.hpp"
+#include "urban_gnss_localization/ros/simulation_messages.hpp"
+#include "urban_gnss_localization/simulation/city_simulator.hpp"
+#include "urban_gnss_localization/simulation/paper_field_simulator.hpp"
 
 using namespace urban_gnss;
 
 namespace {
 
-/// Simulated time of the first step; not 0, which ROS takes for "no time yet".
-constexpr double kStartTime_s = 1.0;
 constexpr double kMarkerInterval_s = 0.1;
+/// How far the simulation may be behind the wall clock and still catch up; what is more is lost time.
+constexpr double kMaxLag_s = 0.5;
 
-enum class Field { kPaperField };
-EnumNames<Field> enum_names(Field) { return {{"paper_field", Field::kPaperField}}; }
+enum class Field { kPaperField, kCity };
+EnumNames<Field> enum_names(Field) { return {{"paper_field", Field::kPaperField}, {"city", Field::kCity}}; }
 
 struct NodeParameters {
   Field field{Field::kPaperField};
-  std::vector<double> datum{33.8903, 130.8394, 0.0};  ///< deg, deg, m: where the map frame's origin is in the world
+  std::string scenario{};                             ///< file of a city's scenario
+  std::vector<double> datum{33.8903, 130.8394, 0.0};  ///< deg, deg, m: origin of the paper's field
+  bool follow_route{false};      ///< drive the scenario's route on the true pose, whatever is commanded
   bool publish_clock{true};      ///< simulated time on /clock; the other nodes then need use_sim_time
   double real_time_factor{1.0};  ///< seconds of the simulation in a second, at the most
   bool wait_for_command{true};   ///< after each step, wait for the command that answers it
@@ -45,7 +46,9 @@ struct NodeParameters {
   template <class V>
   void visit(V& v) {
     v("field", field);
+    v("scenario", scenario);
     v("datum", datum);
+    v("follow_route", follow_route);
     v("publish_clock", publish_clock);
     v("real_time_factor", real_time_factor, positive());
     v("wait_for_command", wait_for_command);
@@ -53,6 +56,7 @@ struct NodeParameters {
     v("command_timeout", command_timeout, positive());
   }
   void check(std::vector<std::string>& faults) const {
+    if (field == Field::kCity && scenario.empty()) faults.push_back("scenario: a city needs the file of a scenario");
     if (datum.size() != 3) {
       faults.push_back("datum: must be latitude (deg), longitude (deg) and altitude (m)");
       return;
@@ -61,28 +65,69 @@ struct NodeParameters {
   }
 };
 
+struct SeedParameter {
+  int seed{-1};  ///< of a scenario; negative for the file's own
+
+  template <class V>
+  void visit(V& v) {
+    v("seed", seed, any_number());
+  }
+  void check(std::vector<std::string>&) const {}
+};
+
 class SimulatorNode {
  public:
-  SimulatorNode(ros::NodeHandle& node, ros::NodeHandle& private_node)
-      : field_(make(private_node)), frame_({parameters_.datum[0], parameters_.datum[1], parameters_.datum[2]}) {
-    odometry_publisher_ = node.advertise<nav_msgs::Odometry>(topics::kOdometry, 100);
-    fix_publisher_ = node.advertise<sensor_msgs::NavSatFix>(topics::kFix, 100);
-    truth_publisher_ = node.advertise<nav_msgs::Odometry>(topics::kTruth, 100);
-    error_publisher_ = node.advertise<geometry_msgs::Vector3Stamped>(topics::kTrueFixError, 100);
-    shadow_publisher_ = node.advertise<std_msgs::Bool>(topics::kTrueShadow, 100);
-    marker_publisher_ = node.advertise<visualization_msgs::MarkerArray>(topics::kWorld, 2);
+  SimulatorNode(ros::NodeHandle& node, ros::NodeHandle& private_node) : node_(node) {
+    make_world(private_node);
+    local_ = std::make_unique<LocalFrame>(datum_);
+    tf_publisher_ = node.advertise<tf2_msgs::TFMessage>("/tf", 100);
+    marker_publisher_ = node.advertise<visualization_msgs::MarkerArray>(topics::kWorld, 4, true);
     if (parameters_.publish_clock) clock_publisher_ = node.advertise<rosgraph_msgs::Clock>("/clock", 100);
-    command_subscriber_ =
-        node.subscribe(topics::kCommand, 10, &SimulatorNode::on_command, this, ros::TransportHints().tcpNoDelay());
-    const double period_s = field_.parameters().interval / parameters_.real_time_factor;
-    timer_ = node.createWallTimer(ros::WallDuration(period_s), [this](const ros::WallTimerEvent&) { step(); });
+    if (city_ != nullptr) start_city();
+    if (!parameters_.follow_route) {
+      command_subscriber_ =
+          node.subscribe(topics::kCommand, 10, &SimulatorNode::on_command, this, ros::TransportHints().tcpNoDelay());
+    }
+    const double period_s = simulator_->interval_s() / parameters_.real_time_factor;
+    started_ = ros::WallTime::now();
+    timer_ = node.createWallTimer(ros::WallDuration(period_s), [this](const ros::WallTimerEvent&) { catch_up(); });
   }
 
  private:
-  PaperField make(const ros::NodeHandle& private_node) {
-    PaperFieldParameters field;
-    read_private_parameters(private_node, field, motion_, frames_, parameters_);
-    return PaperField(field, motion_);
+  void make_world(const ros::NodeHandle& private_node) {
+    ParameterReader which(private_parameters(private_node));
+    which.read(parameters_);
+    if (parameters_.field == Field::kPaperField) {
+      PaperFieldParameters field;
+      read_private_parameters(private_node, field, motion_, frames_, parameters_);
+      simulator_ = std::make_unique<PaperFieldSimulator>(field, motion_);
+      field_ = field;
+      datum_ = {parameters_.datum[0], parameters_.datum[1], parameters_.datum[2]};
+      return;
+    }
+    SeedParameter seed;
+    read_private_parameters(private_node, frames_, parameters_, seed);
+    std::vector<std::string> overrides;
+    if (seed.seed >= 0) overrides.push_back("seed=" + std::to_string(seed.seed));
+    auto city = std::make_unique<CitySimulator>(load_scenario(parameters_.scenario, overrides));
+    city_ = city.get();
+    datum_ = city->scenario().datum;
+    simulator_ = std::move(city);
+  }
+
+  void start_city() {
+    const Scenario& scenario = city_->scenario();
+    static_tf_publisher_ = node_.advertise<tf2_msgs::TFMessage>("/tf_static", 1, true);
+    const ros::Time time = to_ros(city_->now());
+    static_tf_publisher_.publish(
+        mounting_transforms(scenario.vehicle.antenna(), scenario.lidar.mount(), time, frames_));
+    datum_publisher_ = node_.advertise<sensor_msgs::NavSatFix>(topics::kDatum, 1, true);
+    datum_publisher_.publish(to_message(datum_, time, frames_.base.map));
+    marker_publisher_.publish(world_markers(scenario.world, scenario.route, time, frames_.base.map));
+    traffic_publisher_ = node_.advertise<visualization_msgs::MarkerArray>("traffic_markers", 2);
+    signal_publisher_ = node_.advertise<visualization_msgs::MarkerArray>("signal_markers", 2);
+    ROS_INFO_STREAM(scenario.file << ": " << scenario.world.buildings.size() << " buildings, "
+                                  << scenario.world.trees.size() << " trees, seed " << scenario.seed);
   }
 
   void on_command(const geometry_msgs::Twist& message) {
@@ -95,22 +140,42 @@ class SimulatorNode {
     ++commands_;
   }
 
-  void step() {
-    const double interval = field_.parameters().interval;
-    if (command_age_s_ > parameters_.command_timeout) command_ = {};
-    command_age_s_ += interval;
-    time_s_ += interval;
-    // What the odometry reports is the input: the robot's own noise is what it cannot see.
-    const BicycleInput input = bicycle_input(command_, motion_.wheelbase);
-    field_.step(input);
-    const Twist2 reported{input.speed_mps, yaw_rate(input, motion_.wheelbase)};
-    odometry_pose_ = move(odometry_pose_, reported, interval);
-    const std::uint64_t commands_before = commands_;
-    publish(reported, field_.fix());
-    if (parameters_.wait_for_command && command_publishers() > 0) await_command(commands_before);
+  /// As many steps as the wall clock asks for: a scan that takes longer than a step is made up for by the next ones.
+  void catch_up() {
+    if (parameters_.wait_for_command && command_subscriber_.getNumPublishers() > 0) {
+      lost_s_ = wall_s() - simulated_s_;  // the commands set the pace
+      step();
+      return;
+    }
+    do {
+      step();
+    } while (ros::ok() && simulated_s_ < wall_s() - lost_s_ - simulator_->interval_s());
+    const double lag_s = wall_s() - lost_s_ - simulated_s_;
+    if (lag_s <= kMaxLag_s) return;
+    lost_s_ += lag_s;
+    ROS_WARN_STREAM_THROTTLE(10.0, "slower than asked for: real-time factor "
+                                       << parameters_.real_time_factor * simulated_s_ / wall_s() << " so far, not "
+                                       << parameters_.real_time_factor);
   }
 
-  std::uint32_t command_publishers() const { return command_subscriber_.getNumPublishers(); }
+  /// Wall time since the start, in simulated seconds at the factor asked for.
+  double wall_s() const { return (ros::WallTime::now() - started_).toSec() * parameters_.real_time_factor; }
+
+  void step() {
+    const double interval = simulator_->interval_s();
+    if (command_age_s_ > parameters_.command_timeout) command_ = {};
+    command_age_s_ += interval;
+    simulated_s_ += interval;
+    events_.clear();
+    simulator_->step(parameters_.follow_route ? std::nullopt : std::optional<Twist2>(command_), events_);
+    const std::uint64_t commands_before = commands_;
+    publish();
+    if (parameters_.wait_for_command && command_subscriber_.getNumPublishers() > 0) await_command(commands_before);
+    if (parameters_.follow_route && simulator_->is_finished() && !said_finished_) {
+      said_finished_ = true;
+      ROS_INFO("the scenario is at its end; the simulation goes on");
+    }
+  }
 
   /// The loop is closed at every step, as in the paper, however slow the machine is.
   void await_command(std::uint64_t commands_before) {
@@ -120,78 +185,87 @@ class SimulatorNode {
     }
   }
 
-  void publish(const Twist2& twist, const SimulatedFix& fix) {
-    const ros::Time time(time_s_);
+  void publish() {
     if (parameters_.publish_clock) {
       rosgraph_msgs::Clock clock;
-      clock.clock = time;
+      clock.clock = to_ros(simulator_->now());
       clock_publisher_.publish(clock);
     }
-    broadcaster_.sendTransform(to_transform(odometry_pose_, time, frames_.odom, frames_.base_link));
-    odometry_publisher_.publish(odometry(odometry_pose_, twist, time, frames_.odom));
-    truth_publisher_.publish(odometry(field_.truth(), twist, time, frames_.map));
-
-    const GeodeticPosition place = frame_.to_geodetic({fix.position.x(), fix.position.y(), 0.0});
-    sensor_msgs::NavSatFix message = to_message(place, time, frames_.base_link);
-    // A receiver does not know that it is in the shadow: it claims the accuracy of direct reception everywhere.
-    const double claimed = std::pow(std::max(field_.parameters().fix_direct_sigma, 1e-3), 2);
-    message.position_covariance = {claimed, 0.0, 0.0, 0.0, claimed, 0.0, 0.0, 0.0, 4.0 * claimed};
-    message.position_covariance_type = sensor_msgs::NavSatFix::COVARIANCE_TYPE_DIAGONAL_KNOWN;
-    fix_publisher_.publish(message);
-
-    geometry_msgs::Vector3Stamped error;
-    error.header.stamp = time;
-    error.header.frame_id = frames_.map;
-    error.vector.x = fix.position.x() - field_.truth().x;
-    error.vector.y = fix.position.y() - field_.truth().y;
-    error_publisher_.publish(error);
-    std_msgs::Bool shadow;
-    shadow.data = fix.in_shadow;
-    shadow_publisher_.publish(shadow);
-
-    if (marker_publisher_.getNumSubscribers() > 0 && time_s_ - last_markers_s_ >= kMarkerInterval_s) {
-      last_markers_s_ = time_s_;
-      marker_publisher_.publish(field_markers(field_.parameters().shadow_border,
-                                              1.6 * field_.parameters().target_ring_radius, field_.truth(),
-                                              motion_.wheelbase, time, frames_.map));
+    for (const SimulationEvent& event : events_) {
+      write_messages(event, *local_, frames_, [this](const std::string& topic, const auto& message) {
+        publisher<std::decay_t<decltype(message)>>(topic).publish(message);
+      });
+      if (city_ != nullptr) publish_markers(event);
+    }
+    if (simulated_s_ - last_markers_s_ < kMarkerInterval_s) return;
+    last_markers_s_ = simulated_s_;
+    const ros::Time time = to_ros(simulator_->now());
+    if (city_ != nullptr) {
+      if (traffic_publisher_.getNumSubscribers() == 0) return;
+      traffic_publisher_.publish(traffic_markers(simulator_->truth(), city_->scenario().lidar, city_->cars(),
+                                                 city_->elapsed_s(), time, frames_.base.map));
+    } else if (marker_publisher_.getNumSubscribers() > 0) {
+      marker_publisher_.publish(field_markers(field_.shadow_border, 1.6 * field_.target_ring_radius,
+                                              simulator_->truth(), motion_.wheelbase, time, frames_.base.map));
     }
   }
 
-  nav_msgs::Odometry odometry(const Pose2& pose, const Twist2& twist, const ros::Time& time,
-                              const std::string& frame) const {
-    nav_msgs::Odometry message;
-    message.header.stamp = time;
-    message.header.frame_id = frame;
-    message.child_frame_id = frames_.base_link;
-    message.pose.pose = to_message(pose);
-    message.twist.twist.linear.x = twist.speed_mps;
-    message.twist.twist.angular.z = twist.yaw_rate_radps;
-    const MotionStep step = make_motion_step(twist, field_.parameters().interval, motion_);
-    message.twist.covariance[0] = step.speed_sigma * step.speed_sigma;
-    message.twist.covariance[35] = step.yaw_rate_sigma * step.yaw_rate_sigma;
-    return message;
+  void publish_markers(const SimulationEvent& event) {
+    if (const auto* truth = std::get_if<TruthEvent>(&event.content)) {
+      tf2_msgs::TFMessage transforms;  // so that rviz has a map frame also where no localizer runs
+      transforms.transforms.push_back(
+          to_transform(truth->pose, to_ros(event.stamp), frames_.base.map, frames_.base.base_link + "_truth"));
+      tf_publisher_.publish(transforms);
+      return;
+    }
+    const ros::Time time = to_ros(event.stamp);
+    if (const auto* signals = std::get_if<SignalsEvent>(&event.content)) {
+      if (signal_publisher_.getNumSubscribers() > 0)
+        signal_publisher_.publish(signal_markers(*signals, time, frames_.base.map));
+    } else if (const auto* fix = std::get_if<FixEvent>(&event.content)) {
+      if (fix->published.publisher == 0 && fix->published.has_fix) last_fix_ = fix->published.fix;
+    } else if (const auto* truth = std::get_if<FixTruthEvent>(&event.content)) {
+      traffic_publisher_.publish(fix_markers(last_fix_, truth->error, time, frames_.base.map));
+    }
   }
 
+  /// Publishers are made when their first message comes: a scenario without a lidar has no topic for one.
+  template <class Message>
+  ros::Publisher& publisher(const std::string& topic) {
+    if (topic == "tf") return tf_publisher_;
+    const auto known = publishers_.find(topic);
+    if (known != publishers_.end()) return known->second;
+    return publishers_.emplace(topic, node_.advertise<Message>(topic, 100)).first->second;
+  }
+
+  ros::NodeHandle node_;
   NodeParameters parameters_;
-  Frames frames_;
-  MotionParameters motion_;
-  PaperField field_;
-  LocalFrame frame_;
+  SimulationFrames frames_;
+  MotionParameters motion_;     ///< of the paper's field
+  PaperFieldParameters field_;  ///< where there is no scenario
+  GeodeticPosition datum_;
+  std::unique_ptr<Simulator> simulator_;
+  const CitySimulator* city_{nullptr};  ///< simulator_, where that is one
+  std::unique_ptr<LocalFrame> local_;
+  std::vector<SimulationEvent> events_;
+  ReceiverFix last_fix_;
   Twist2 command_;
   double command_age_s_{0.0};
   std::uint64_t commands_{0};
-  double time_s_{kStartTime_s};
+  ros::WallTime started_;
+  double simulated_s_{0.0};
+  double lost_s_{0.0};
   double last_markers_s_{0.0};
-  Pose2 odometry_pose_;
+  bool said_finished_{false};
+  std::map<std::string, ros::Publisher> publishers_;
   ros::Publisher clock_publisher_;
-  ros::Publisher odometry_publisher_;
-  ros::Publisher fix_publisher_;
-  ros::Publisher truth_publisher_;
-  ros::Publisher error_publisher_;
-  ros::Publisher shadow_publisher_;
+  ros::Publisher tf_publisher_;
+  ros::Publisher static_tf_publisher_;
+  ros::Publisher datum_publisher_;
   ros::Publisher marker_publisher_;
+  ros::Publisher traffic_publisher_;
+  ros::Publisher signal_publisher_;
   ros::Subscriber command_subscriber_;
-  tf2_ros::TransformBroadcaster broadcaster_;
   ros::WallTimer timer_;
 };
 

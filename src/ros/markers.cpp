@@ -3,46 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "marker_parts.hpp"
 #include "urban_gnss_localization/ros/conversions.hpp"
 
 namespace urban_gnss {
 namespace {
 
 using visualization_msgs::Marker;
-
-struct Colour {
-  float r, g, b, a;
-};
-
-Marker make_marker(const char* ns, int id, int type, Colour colour, const ros::Time& time, const std::string& frame) {
-  Marker marker;
-  marker.header.frame_id = frame;
-  marker.header.stamp = time;
-  marker.ns = ns;
-  marker.id = id;
-  marker.type = type;
-  marker.action = Marker::ADD;
-  marker.pose.orientation.w = 1.0;
-  marker.color.r = colour.r;
-  marker.color.g = colour.g;
-  marker.color.b = colour.b;
-  marker.color.a = colour.a;
-  return marker;
-}
-
-geometry_msgs::Point point(double x, double y, double z) {
-  geometry_msgs::Point p;
-  p.x = x;
-  p.y = y;
-  p.z = z;
-  return p;
-}
-
-void set_scale(Marker& marker, double x, double y, double z) {
-  marker.scale.x = x;
-  marker.scale.y = y;
-  marker.scale.z = z;
-}
 
 }  // namespace
 

@@ -1,9 +1,10 @@
-// The files in config/ and the structs that read them: neither may have a parameter that the other does not know, and
-// the files that document the defaults must state them.
+// The files in config/ and scenarios/ and the structs that read them: neither may have a parameter that the other does
+// not know, and the files that document the defaults must state them.
 
 #include <gtest/gtest.h>
 #include <yaml-cpp/yaml.h>
 
+#include <filesystem>
 #include <fstream>
 #include <map>
 #include <regex>
@@ -15,7 +16,9 @@
 #include "urban_gnss_localization/filters/ukf.hpp"
 #include "urban_gnss_localization/pipeline/bias_pipeline.hpp"
 #include "urban_gnss_localization/pipeline/localization_pipeline.hpp"
+#include "urban_gnss_localization/simulation/city_simulator.hpp"
 #include "urban_gnss_localization/simulation/paper_field.hpp"
+#include "urban_gnss_localization/simulation/scenario_world.hpp"
 
 namespace urban_gnss {
 namespace {
@@ -128,7 +131,10 @@ Values frames() { return declared_in("include/urban_gnss_localization/ros/conver
 Values shell() { return merged(frames(), declared_in("include/urban_gnss_localization/ros/localizer_node.hpp")); }
 Values filter_node() { return merged(shell(), declared_in("src/nodes/particle_filter_node.cpp")); }
 Values controller_node() { return declared_in("src/nodes/waypoint_controller_node.cpp"); }
-Values simulator_node() { return merged(frames(), declared_in("src/nodes/simulator_node.cpp")); }
+Values simulator_node() {
+  return merged(merged(frames(), declared_in("include/urban_gnss_localization/ros/simulation_messages.hpp")),
+                declared_in("src/nodes/simulator_node.cpp"));
+}
 
 TEST(Config, LocalizationStatesEveryDefault) {
   expect_states(values_of(load("localization.yaml")), merged(shell(), defaults_of(LocalizationParameters())));
@@ -203,6 +209,22 @@ TEST(Config, PaperFieldAgreesWithItself) {
   const std::vector<double> targets = field.targets();
   ASSERT_EQ(steering.targets.size(), targets.size());
   for (std::size_t i = 0; i < targets.size(); ++i) EXPECT_NEAR(steering.targets[i], targets[i], 1e-8) << i;
+}
+
+TEST(Config, EveryScenarioIsReadWithoutFault) {
+  int count = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(PACKAGE_DIRECTORY "/scenarios")) {
+    ASSERT_EQ(entry.path().extension(), ".yaml") << entry.path();
+    ++count;
+    try {
+      const Scenario scenario = load_scenario(entry.path().string());
+      EXPECT_EQ(joined(world_faults(scenario.world, scenario.start.position())), kNoFault) << entry.path();
+      EXPECT_NO_THROW(CitySimulator{scenario}) << entry.path();
+    } catch (const std::exception& error) {
+      ADD_FAILURE() << error.what();
+    }
+  }
+  EXPECT_GE(count, 6);
 }
 
 // rosparam (YAML 1.1) and yaml-cpp (1.2) must take every value for the same thing.

@@ -156,6 +156,68 @@ TEST(Parameters, WhatIsNoMapIsAFault) {
   EXPECT_EQ(fault("[1, 2]"), "parameters must be a map of names to values");
 }
 
+std::vector<std::string> faults_of(const std::string& yaml, const std::string& source, const std::string& path) {
+  Example example;
+  ParameterReader reader(YAML::Load(yaml), source, path);
+  return reader.read(example).finish();
+}
+
+TEST(Parameters, FaultSaysFileLineAndPath) {
+  const auto faults = faults_of(
+      "gate_probability: 0.5\n\nmass_kg: -1\nparticle_count: few\ncolour: green\noffset: [1,\n  .nan]\n"
+      "wings: 2\n[1]: 2\n",
+      "city.yaml", "receiver.");
+  ASSERT_EQ(faults.size(), 6u);
+  EXPECT_EQ(faults[0], "city.yaml:3: receiver.mass_kg = -1: must be a finite number greater than 0");
+  EXPECT_EQ(faults[1], "city.yaml:4: receiver.particle_count = few: must be a whole number");
+  EXPECT_EQ(faults[2], "city.yaml:5: receiver.colour = green: must be one of red, blue");
+  EXPECT_EQ(faults[3], "city.yaml:6: receiver.offset = [1, .nan]: must be finite numbers");
+  EXPECT_EQ(faults[4], "city.yaml:8: receiver.wings: no such parameter");
+  EXPECT_EQ(faults[5], "city.yaml:9: a parameter's name must be a text");
+}
+
+TEST(Parameters, FaultBetweenFieldsHasTheLineOfTheFirstName) {
+  const auto faults = faults_of("\nparticle_count: 5\nmass_kg: 200\n", "a.yaml", "");
+  ASSERT_EQ(faults.size(), 1u);
+  EXPECT_EQ(faults[0], "a.yaml:3: mass_kg: too heavy for so few particles");
+}
+
+TEST(Parameters, PathWithoutSourceAndSourceWithoutLine) {
+  EXPECT_EQ(faults_of("{mass_kg: 0}", "", "x.").at(0), "x.mass_kg = 0: must be a finite number greater than 0");
+  EXPECT_EQ(faults_of("7", "a.yaml", "list[2].").at(0), "a.yaml:1: list[2] must be a map of names to values");
+  YAML::Node made;
+  made["mass_kg"] = 0;
+  Example example;
+  ParameterReader reader(made, "a.yaml");
+  EXPECT_EQ(reader.read(example).finish().at(0), "a.yaml: mass_kg = 0: must be a finite number greater than 0");
+}
+
+TEST(Parameters, ChildIsReadByTheCallerAndKnown) {
+  ParameterReader reader(YAML::Load("inner:\n  mass_kg: 0\nlist: [1, 2]\n"), "a.yaml");
+  Example example;
+  EXPECT_TRUE(reader.has("inner"));
+  EXPECT_FALSE(reader.has("outer"));
+  EXPECT_TRUE(reader.child("outer").IsNull());
+  ParameterReader inner(reader.child("inner"), reader.source(), "inner.");
+  reader.add(inner.read(example).finish());
+  const YAML::Node list = reader.child("list");
+  reader.fault(list[1], "list[1]", "is no good");
+  reader.fault("list", "has two");
+  reader.fault("outer", "is missing");
+  const auto faults = reader.finish();
+  ASSERT_EQ(faults.size(), 4u);
+  EXPECT_EQ(faults[0], "a.yaml:2: inner.mass_kg = 0: must be a finite number greater than 0");
+  EXPECT_EQ(faults[1], "a.yaml:3: list[1]: is no good");
+  EXPECT_EQ(faults[2], "a.yaml:3: list: has two");
+  EXPECT_EQ(faults[3], "a.yaml:1: outer: is missing");
+}
+
+TEST(Parameters, ChildOfWhatIsNoMapIsNull) {
+  ParameterReader reader(YAML::Load("[1, 2]"));
+  EXPECT_TRUE(reader.child("inner").IsNull());
+  EXPECT_EQ(reader.finish().size(), 1u);
+}
+
 TEST(Parameters, SeveralStructsShareOneMap) {
   struct Other {
     double height_m{1.0};

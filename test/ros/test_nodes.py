@@ -4,6 +4,7 @@ waits for."""
 import os
 import signal
 import subprocess
+import tempfile
 import unittest
 
 import rospy
@@ -35,6 +36,29 @@ class NodesTest(unittest.TestCase):
                 for fault in faults:
                     self.assertIn(fault, done.stdout)
                 rospy.delete_param("tested_" + node)
+
+    def test_bad_scenario_stops_the_simulator_with_all_faults(self):
+        def refuse(*arguments):
+            done = subprocess.run(command("simulator_node", "_field:=city", *arguments), stdout=subprocess.PIPE,
+                                  stderr=subprocess.STDOUT, universal_newlines=True, timeout=30)
+            self.assertEqual(done.returncode, 1, done.stdout)
+            rospy.delete_param("tested_simulator_node")
+            return done.stdout
+
+        with tempfile.TemporaryDirectory() as directory:
+            scenario = os.path.join(directory, "bad.yaml")
+            with open(scenario, "w") as file:
+                file.write("receiver: {rate: 99}\n"
+                           "buildings:\n"
+                           "  - {name: bank, box: {center: [0, 0], size: [9, 9]}, roof: 5}\n"
+                           "route: {waypoints: [[0, 0], [50, 0]], sped: 3}\n")
+            output = refuse("_scenario:=" + scenario)
+            for fault in ("bad.yaml:1: receiver.rate = 99", "start (0, 0) is inside bank",
+                          "bad.yaml:4: route.sped: no such parameter; did you mean speed?"):
+                self.assertIn(fault, output)
+            self.assertIn("absent.yaml: cannot be read", refuse("_scenario:=" + os.path.join(directory, "absent.yaml")))
+        self.assertIn("scenario: a city needs the file of a scenario", refuse())
+        self.assertIn("did you mean follow_route?", refuse("_scenario:=x", "_follow_rout:=true"))
 
     def test_interrupt_ends_the_node_cleanly(self):
         for node in NODES:

@@ -50,15 +50,23 @@ const char* enum_name(E value) {
 /// `v("name", field, range)` for numbers and `v("name", field)` for booleans, strings, enumerations and lists; and its
 /// conditions between fields in `void check(std::vector<std::string>& faults) const`. A name that is absent keeps its
 /// default; a name that nothing asked for is a fault, with the nearest known name.
+///
+/// A fault names the file and the line where it is known: `city.yaml:12: receiver.rate = 99: must be at most 20`.
 class ParameterReader {
  public:
-  /// `map` may be undefined or null (all defaults).
-  explicit ParameterReader(const YAML::Node& map) : map_(map.IsDefined() ? map : YAML::Node()) {}
+  /// `map` may be undefined or null (all defaults). `source` is the name of the file that it was read from, empty where
+  /// there is none or a fault needs no place. `path` stands before each name in the faults, as `receiver.` or
+  /// `buildings[2].` does.
+  explicit ParameterReader(const YAML::Node& map, std::string source = "", std::string path = "")
+      : map_(map.IsDefined() ? map : YAML::Node()), source_(std::move(source)), path_(std::move(path)) {}
 
   template <class P>
   ParameterReader& read(P& parameters) {
     parameters.visit(*this);
-    parameters.check(faults_);
+    std::vector<std::string> faults;
+    parameters.check(faults);
+    for (const std::string& text : faults)
+      faults_.push_back(at(text.substr(0, text.find_first_of(" :"))) + path_ + text);
     return *this;
   }
 
@@ -67,7 +75,7 @@ class ParameterReader {
     static_assert(std::is_arithmetic_v<T>, "a range belongs to a number");
     const bool was_read = convert(name, value, std::is_integral_v<T> ? "a whole number" : "a number");
     if (was_read && !range.contains(static_cast<double>(value))) {
-      faults_.push_back(name + " = " + text(name) + ": must be " + range.describe());
+      bad_value(name, "must be " + range.describe());
     }
   }
 
@@ -82,7 +90,7 @@ class ParameterReader {
     } else {
       if (convert(name, value, "a list of numbers")) {
         for (const double element : value) {
-          if (!std::isfinite(element)) faults_.push_back(name + " = " + text(name) + ": must be finite numbers");
+          if (!std::isfinite(element)) bad_value(name, "must be finite numbers");
         }
       }
     }
@@ -90,6 +98,24 @@ class ParameterReader {
 
   /// Allows a name that someone else reads.
   void ignore(const std::string& name) { known_.insert(name); }
+
+  /// Whether the map has a value under the name.
+  bool has(const std::string& name) const;
+  /// The value under the name, for the caller to read; null where there is none.
+  YAML::Node child(const std::string& name);
+
+  /// Adds a fault that the caller found in what stands under the name: `name: text`.
+  void fault(const std::string& name, const std::string& text) {
+    faults_.push_back(at(name) + path_ + name + ": " + text);
+  }
+  /// The same with the place of an element of it.
+  void fault(const YAML::Node& place, const std::string& name, const std::string& text) {
+    faults_.push_back(at(place) + path_ + name + ": " + text);
+  }
+  /// Takes over faults that already say where they are: those of a reader of a child, or of another file.
+  void add(const std::vector<std::string>& faults) { faults_.insert(faults_.end(), faults.begin(), faults.end()); }
+
+  const std::string& source() const { return source_; }
 
   /// Every fault, in the order found, the unknown names last. Empty where the parameters can be used.
   std::vector<std::string> finish() const;
@@ -106,7 +132,7 @@ class ParameterReader {
       value = map_[name].as<T>();
       return true;
     } catch (const YAML::Exception&) {
-      faults_.push_back(name + " = " + text(name) + ": must be " + expected);
+      bad_value(name, std::string("must be ") + expected);
       return false;
     }
   }
@@ -123,13 +149,19 @@ class ParameterReader {
       }
       choices += (choices.empty() ? "" : ", ") + std::string(choice);
     }
-    faults_.push_back(name + " = " + text(name) + ": must be one of " + choices);
+    bad_value(name, "must be one of " + choices);
   }
 
-  bool has(const std::string& name) const;
+  /// `file:line: `, as far as it is known.
+  std::string at(const YAML::Node& place) const;
+  /// The place of the value under the name; of the map where it has none.
+  std::string at(const std::string& name) const;
   std::string text(const std::string& name) const;
+  void bad_value(const std::string& name, const std::string& text);
 
   YAML::Node map_;
+  std::string source_;
+  std::string path_;
   std::set<std::string> known_;
   std::vector<std::string> faults_;
 };

@@ -33,6 +33,8 @@ inline constexpr char kTargetPath[] = "targets_path";
 inline constexpr char kTruth[] = "ground_truth/odom";
 inline constexpr char kTrueFixError[] = "ground_truth/gps_error";
 inline constexpr char kTrueShadow[] = "ground_truth/in_shadow";
+inline constexpr char kTrueSignals[] = "ground_truth/signal_paths";
+inline constexpr char kPoints[] = "points";
 inline constexpr char kWorld[] = "world_markers";
 
 }  // namespace urban_gnss::topics

@@ -1,0 +1,232 @@
+// Drives a scenario offline and writes what the robot's sensors publish into a bag, with the ground truth beside it.
+// The same scenario and seed give the same bag, byte for byte.
+
+#include <ros/package.h>
+#include <rosbag/bag.h>
+#include <sensor_msgs/NavSatFix.h>
+
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <filesystem>
+#include <iomanip>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "output_file.hpp"
+#include "urban_gnss_localization/common/progress.hpp"
+#include "urban_gnss_localization/ros/simulation_messages.hpp"
+#include "urban_gnss_localization/simulation/city_simulator.hpp"
+#include "urban_gnss_localization/simulation/paper_field_simulator.hpp"
+#include "urban_gnss_localization/simulation/simulation_statistics.hpp"
+
+namespace fs = std::filesystem;
+using namespace urban_gnss;
+
+namespace {
+
+constexpr double kPaperFieldDuration_s = 30.0;  ///< three laps
+
+struct Options {
+  std::string scenario;
+  std::string output;
+  std::string json_file;
+  std::vector<std::string> overrides;
+  int seed = -1;
+  double duration_s = 0.0;
+  bool without_lidar = false;
+};
+
+/// A world with what the bag needs to know of it.
+struct Run {
+  std::unique_ptr<Simulator> simulator;
+  GeodeticPosition datum;
+  std::string name;
+  int seed = 0;
+  std::optional<tf2_msgs::TFMessage> mounting;
+};
+
+fs::path find_scenario(const std::string& name) {
+  if (fs::is_regular_file(name)) return name;
+  const fs::path package = ros::package::getPath("urban_gnss_localization");
+  std::string known;
+  if (package.empty()) throw std::runtime_error(name + ": no such file");
+  for (const fs::path& candidate :
+       {package / "scenarios" / (name + ".yaml"), package / "config" / name / "simulator.yaml"}) {
+    if (fs::is_regular_file(candidate)) return candidate;
+  }
+  std::vector<std::string> names;
+  for (const auto& entry : fs::directory_iterator(package / "scenarios")) names.push_back(entry.path().stem());
+  std::sort(names.begin(), names.end());
+  for (const std::string& other : names) known += ", " + other;
+  throw std::runtime_error(name + ": neither a file nor one of the scenarios paper_field" + known);
+}
+
+Run make_paper_field(const fs::path& file, const YAML::Node& values, const Options& options) {
+  if (!options.overrides.empty())
+    throw std::runtime_error("--set: the paper's field takes none; copy " + file.string());
+  PaperFieldParameters field;
+  MotionParameters motion;
+  ParameterReader reader(values, file.string());
+  reader.ignore("field");
+  reader.read(field).read(motion);
+  if (options.seed >= 0) field.seed = options.seed;
+  const auto faults = reader.finish();
+  if (!faults.empty()) throw ParameterError(file.string(), faults);
+  Run run;
+  const double duration_s = options.duration_s > 0.0 ? options.duration_s : kPaperFieldDuration_s;
+  run.simulator = std::make_unique<PaperFieldSimulator>(field, motion, duration_s);
+  run.datum = PaperFieldSimulator::kDatum;
+  run.seed = field.seed;
+  return run;
+}
+
+Run make_city(const fs::path& file, const SimulationFrames& frames, const Options& options) {
+  std::vector<std::string> overrides = options.overrides;
+  if (options.seed >= 0) overrides.push_back("seed=" + std::to_string(options.seed));
+  if (options.duration_s > 0.0) overrides.push_back("duration=" + std::to_string(options.duration_s));
+  if (options.without_lidar) overrides.push_back("lidar.type=none");
+  auto city = std::make_unique<CitySimulator>(load_scenario(file.string(), overrides));
+  Run run;
+  const Scenario& scenario = city->scenario();
+  run.datum = scenario.datum;
+  run.seed = scenario.seed;
+  run.mounting = mounting_transforms(scenario.vehicle.antenna(), scenario.lidar.mount(), to_ros(city->now()), frames);
+  run.simulator = std::move(city);
+  return run;
+}
+
+Run make_run(const Options& options, const SimulationFrames& frames) {
+  const fs::path file = find_scenario(options.scenario);
+  YAML::Node values;
+  try {
+    values = YAML::LoadFile(file.string());
+  } catch (const YAML::ParserException& error) {
+    throw std::runtime_error(file.string() + ":" + std::to_string(error.mark.line + 1) + ": " + error.msg);
+  }
+  const bool is_paper_field = values.IsMap() && values["field"].IsDefined();
+  Run run = is_paper_field ? make_paper_field(file, values, options) : make_city(file, frames, options);
+  run.name = file.stem() == "simulator" ? file.parent_path().filename().string() : file.stem().string();
+  return run;
+}
+
+/// A bag whose messages come in the order of their publication, each a nanosecond after the one before it where both
+/// are published at once: who reads a bag gets messages of equal times in an order that rosbag does not define.
+class BagWriter {
+ public:
+  explicit BagWriter(const fs::path& file) {
+    if (file.has_parent_path()) fs::create_directories(file.parent_path());
+    bag_.open(file.string(), rosbag::bagmode::Write);
+  }
+  template <class Message>
+  void write(const std::string& topic, Stamp published, const Message& message) {
+    last_ = std::max(published, last_ + Stamp(1));
+    bag_.write("/" + topic, to_ros(last_), message);
+  }
+  void close() { bag_.close(); }
+
+ private:
+  rosbag::Bag bag_;
+  Stamp last_{0};
+};
+
+void print_summary(const ReceiverSummary& summary, std::ostream& out) {
+  out << std::fixed << std::setprecision(1);
+  out << "fixes           " << summary.epochs << " epochs, " << 100.0 * summary.availability << " % with a fix, "
+      << summary.used_mean << " satellites in one\n"
+      << "error           median " << summary.error_m.median << " m, 95 % " << summary.error_m.p95 << " m, max "
+      << summary.error_m.max << " m, correlation time " << summary.correlation_time_s << " s\n"
+      << "claimed sigma   median " << summary.claimed_sigma_m.median << " m, NEES " << summary.nees_mean
+      << " (2 were honest)\n"
+      << "path class      share   range error median / 95 % of its size, m   C/N0 median, dB-Hz\n";
+  double all = 0.0;
+  for (const PathClassSummary& of_class : summary.classes) all += static_cast<double>(of_class.count);
+  for (const PathClassSummary& of_class : summary.classes) {
+    out << std::left << std::setw(14) << enum_name(of_class.path_class) << std::right << std::setw(5)
+        << 100.0 * static_cast<double>(of_class.count) / all << " %";
+    if (of_class.range_error_m.count > 0) {
+      out << std::setw(16) << of_class.range_error_m.median << " / " << of_class.absolute_range_error_m.p95
+          << std::setw(31) << of_class.cn0_dbhz.median;
+    }
+    out << '\n';
+  }
+}
+
+void run(const Options& options) {
+  const SimulationFrames frames;
+  Run run = make_run(options, frames);
+  Simulator& simulator = *run.simulator;
+  const LocalFrame local(run.datum);
+  std::unique_ptr<BagWriter> bag;
+  const Stamp begin = simulator.now();
+  if (!options.output.empty()) {
+    bag = std::make_unique<BagWriter>(options.output);
+    bag->write(topics::kDatum, begin, to_message(run.datum, to_ros(begin), frames.base.map));
+    if (run.mounting) bag->write("tf_static", begin, *run.mounting);
+  }
+  SimulationStatistics statistics;
+  std::vector<SimulationEvent> events;
+  Progress progress(1000, "per mille");
+  const auto wall_start = std::chrono::steady_clock::now();
+  const auto real_time_factor = [&] {
+    const double wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - wall_start).count();
+    return to_seconds(simulator.now() - begin) / std::max(wall_s, 1e-6);
+  };
+  while (!simulator.is_finished()) {
+    events.clear();
+    simulator.step(std::nullopt, events);
+    for (const SimulationEvent& event : events) {
+      statistics.add(event);
+      if (!bag) continue;
+      write_messages(event, local, frames, [&](const std::string& topic, const auto& message) {
+        bag->write(topic, event.published, message);
+      });
+    }
+    std::ostringstream detail;
+    detail << std::fixed << std::setprecision(0) << to_seconds(simulator.now() - begin) << " s simulated, "
+           << std::setprecision(1) << real_time_factor() << " x real time";
+    progress.report(static_cast<std::size_t>(1000.0 * simulator.progress()), detail.str());
+  }
+  progress.finish();
+  if (bag) bag->close();
+
+  const double simulated_s = to_seconds(simulator.now() - begin);
+  const ReceiverSummary summary = statistics.summary();
+  std::cout << std::fixed << std::setprecision(1) << "scenario        " << run.name << ", seed " << run.seed << ", "
+            << simulated_s << " s, " << real_time_factor() << " x real time\n";
+  if (!options.output.empty()) std::cout << "written         " << options.output << '\n';
+  print_summary(summary, std::cout);
+  if (!options.json_file.empty()) {
+    nlohmann::json json = to_json(summary);
+    json["scenario"] = run.name;
+    json["seed"] = run.seed;
+    json["duration_s"] = simulated_s;
+    write_file(options.json_file, [&](std::ostream& out) { out << json.dump(2) << '\n'; });
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Options options;
+  CLI::App app("Drives a scenario offline: a bag of what the sensors publish, and how the receiver did.");
+  app.option_defaults()->always_capture_default();
+  app.add_option("--scenario", options.scenario, "a scenario's file, or the name of one that comes with the package")
+      ->required();
+  app.add_option("--output", options.output, "bag to write");
+  app.add_option("--json", options.json_file, "write how the receiver did here");
+  app.add_option("--seed", options.seed, "seed of all noise; default: the scenario's");
+  app.add_option("--duration", options.duration_s, "s to simulate; default: the scenario's")
+      ->check(CLI::PositiveNumber);
+  app.add_option("--set", options.overrides, "one value, SECTION.NAME=VALUE; repeatable");
+  app.add_flag("--without-lidar", options.without_lidar, "no scans, which take most of the time and of the bag");
+  CLI11_PARSE(app, argc, argv);
+  try {
+    run(options);
+  } catch (const std::exception& error) {
+    std::cerr << "simulate: " << error.what() << '\n';
+    return 1;
+  }
+  return 0;
+}

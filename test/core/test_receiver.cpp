@@ -1,0 +1,151 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+#include "receiver_rig.hpp"
+#include "urban_gnss_localization/simulation/receiver.hpp"
+
+namespace urban_gnss {
+namespace {
+
+TEST(Receiver, WithoutNoiseTheFixIsTheTruth) {
+  Receiver receiver(without_noise(), 1);
+  for (int i = 0; i < 20; ++i) {
+    const Eigen::Vector3d antenna(2.0 * i, 3.0, 1.5);
+    const ReceiverEpoch epoch = receiver.epoch(kEpoch, antenna, {10.0, 0.0, 0.0}, open_sky());
+    ASSERT_TRUE(epoch.fix);
+    EXPECT_LT((epoch.fix->position - antenna).norm(), 0.02);
+    EXPECT_EQ(epoch.fix->velocity, Eigen::Vector3d(10.0, 0.0, 0.0));
+    EXPECT_EQ(epoch.used_count, 14);
+  }
+}
+
+TEST(Receiver, ClaimsUereTimesDilutionWhateverHappens) {
+  ReceiverParameters parameters = without_noise();
+  parameters.uere = 4.0;
+  Receiver receiver(parameters, 1);
+  auto sky = open_sky();
+  for (ReceivedSatellite& s : sky) {
+    s.paths.is_blocked = true;
+    s.paths.has_direct = false;
+    s.paths.reflections = {reflection(s.line_of_sight.x() > 0.0 ? 10.0 : 150.0, 9.0)};
+  }
+  const ReceiverEpoch epoch = receiver.epoch(kEpoch, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(), sky);
+  ASSERT_TRUE(epoch.fix);
+  EXPECT_NEAR(epoch.fix->covariance(0, 0), std::pow(4.0 * epoch.hdop, 2), 1e-9);
+  EXPECT_NEAR(epoch.fix->covariance(1, 1), std::pow(4.0 * epoch.hdop, 2), 1e-9);
+  EXPECT_EQ(epoch.fix->covariance(0, 1), 0.0);
+  EXPECT_GT(epoch.fix->position.head<2>().norm(), 3.0 * std::sqrt(epoch.fix->covariance(0, 0)));
+}
+
+TEST(Receiver, ReportsWhatReceiversReport) {
+  Receiver receiver(ReceiverParameters{}, 3);
+  auto sky = open_sky();
+  sky.push_back(satellite(30, 359.7, 3.0));  // under the mask
+  sky.push_back(behind_a_wall(10.0, 90.0));
+  sky.back().id.svid = 31;
+  ReceiverEpoch epoch;
+  std::vector<double> latencies;
+  for (int i = 0; i < 200; ++i) {
+    epoch = receiver.epoch(kEpoch, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(), sky);
+    latencies.push_back(epoch.latency_s);
+  }
+  EXPECT_GE(quantile(latencies, 0.0), 0.05);
+  EXPECT_LE(quantile(latencies, 1.0), 0.2);
+  EXPECT_GT(quantile(latencies, 1.0) - quantile(latencies, 0.0), 0.14);
+  ASSERT_EQ(epoch.satellites.size(), sky.size());
+  for (std::size_t i = 0; i < sky.size(); ++i) {
+    const SatelliteReport& report = epoch.satellites[i];
+    EXPECT_EQ(report.id, sky[i].id);
+    const double azimuth_deg = radians_to_degrees(report.look.azimuth_rad);
+    const double elevation_deg = radians_to_degrees(report.look.elevation_rad);
+    EXPECT_NEAR(azimuth_deg, std::round(azimuth_deg), 1e-9);
+    EXPECT_NEAR(elevation_deg, std::round(elevation_deg), 1e-9);
+    EXPECT_LT(std::abs(angle_difference(report.look.azimuth_rad, sky[i].look.azimuth_rad)), 0.51 * kPi / 180.0);
+    EXPECT_GE(report.look.azimuth_rad, 0.0);
+    EXPECT_LT(report.look.azimuth_rad, 2.0 * kPi - 1e-9);
+    if (i < 14) {
+      EXPECT_TRUE(report.is_tracked && report.is_used);
+      EXPECT_EQ(report.cn0_dbhz, std::round(report.cn0_dbhz));
+      EXPECT_TRUE(std::isfinite(report.residual_m));
+    }
+  }
+  EXPECT_TRUE(epoch.satellites[14].is_tracked);
+  EXPECT_FALSE(epoch.satellites[14].is_used);
+  EXPECT_TRUE(std::isnan(epoch.satellites[14].residual_m));
+  EXPECT_FALSE(epoch.satellites[15].is_tracked);
+  EXPECT_TRUE(std::isnan(epoch.satellites[15].cn0_dbhz));
+  EXPECT_TRUE(std::isnan(epoch.satellites[15].range_error_m));
+}
+
+TEST(Receiver, LosesTheFixUnderFourSatellitesAndFindsItAgain) {
+  ReceiverParameters parameters;
+  parameters.channel.acquisition_time = 1.0;
+  Receiver receiver(parameters, 1);
+  const auto sky = open_sky();
+  const std::vector<ReceivedSatellite> three(sky.begin(), sky.begin() + 3);
+  const auto has_fix = [&](const std::vector<ReceivedSatellite>& satellites) {
+    const ReceiverEpoch epoch = receiver.epoch(kEpoch, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(), satellites);
+    EXPECT_EQ(epoch.fix.has_value(), epoch.used_count > 0);
+    EXPECT_EQ(epoch.fix.has_value(), std::isfinite(epoch.hdop));
+    return epoch.fix.has_value();
+  };
+  int until_fix = 0;
+  while (!has_fix(sky)) ++until_fix;
+  EXPECT_EQ(until_fix, 5);
+  for (int i = 0; i < 10; ++i) EXPECT_FALSE(has_fix(three));
+  until_fix = 0;
+  while (!has_fix(sky)) ++until_fix;
+  EXPECT_EQ(until_fix, 5);
+  EXPECT_FALSE(has_fix({}));
+}
+
+TEST(Receiver, SmoothingStartsAnewAfterCoasting) {
+  ReceiverParameters parameters = without_noise();
+  parameters.smoothing_time = 8.0;
+  parameters.coasting_time = 3.0;
+  const auto error_after = [&](int missing_epochs) {
+    Receiver receiver(parameters, 1);
+    const Eigen::Vector3d still = Eigen::Vector3d::Zero();
+    for (int i = 0; i < 50; ++i) receiver.epoch(kEpoch, still, still, open_sky());
+    for (int i = 0; i < missing_epochs; ++i) receiver.epoch(kEpoch, still, still, {});
+    const Eigen::Vector3d elsewhere(40.0, 0.0, 0.0);  // carried there without the receiver's notice
+    return (receiver.epoch(kEpoch, elsewhere, still, open_sky()).fix->position - elsewhere).norm();
+  };
+  EXPECT_NEAR(error_after(0), 40.0 * std::exp(-kEpoch / 8.0), 0.1);
+  EXPECT_NEAR(error_after(10), 40.0 * std::exp(-kEpoch / 8.0), 0.1);
+  EXPECT_NEAR(error_after(20), 0.0, 0.1);
+}
+
+TEST(Receiver, SeedDecidesAndSatellitesDoNotDisturbEachOther) {
+  const auto errors = [](std::uint64_t seed, std::size_t count) {
+    Receiver receiver(ReceiverParameters{}, seed);
+    auto sky = open_sky();
+    sky.resize(count);
+    std::vector<double> result;
+    for (int i = 0; i < 50; ++i) {
+      const auto epoch = receiver.epoch(kEpoch, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(), sky);
+      if (i > 10) result.push_back(epoch.satellites[2].range_error_m);
+    }
+    return result;
+  };
+  EXPECT_EQ(errors(1, 14), errors(1, 14));
+  EXPECT_EQ(errors(1, 14), errors(1, 5));
+  EXPECT_NE(errors(1, 14), errors(2, 14));
+}
+
+TEST(Receiver, ParametersMustBeInOrder) {
+  ReceiverParameters parameters;
+  std::vector<std::string> faults;
+  parameters.check(faults);
+  EXPECT_TRUE(faults.empty());
+  parameters.latency_min = 0.3;
+  parameters.channel.tracking_threshold = 40.0;
+  parameters.channel.cn0_horizon = 60.0;
+  parameters.check(faults);
+  EXPECT_EQ(faults.size(), 3u);
+}
+
+}  // namespace
+}  // namespace urban_gnss
