@@ -257,6 +257,7 @@ void LocalizationPipeline::correct_with(const PendingFix& pending, double radius
   measurement.antenna_in_body = transform_point(*motion, antenna_offset());
   measurement.bias_radius_m = radius_m;
   measurement.time_s = to_seconds(pending.fix.stamp);
+  measurement.stamp = pending.fix.stamp;
   FixVerdict verdict = localizer_->correct(measurement);
   verdict.stamp = pending.fix.stamp;
   verdict.covariance_clamped = pending.sanitation.covariance_clamped;

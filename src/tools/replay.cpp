@@ -18,6 +18,7 @@
 #include "urban_gnss_localization/common/progress.hpp"
 #include "urban_gnss_localization/evaluation/report_json.hpp"
 #include "urban_gnss_localization/evaluation/tum.hpp"
+#include "urban_gnss_localization/filters/complementary_ekf.hpp"
 #include "urban_gnss_localization/filters/particle_filter.hpp"
 #include "urban_gnss_localization/filters/ukf.hpp"
 #include "urban_gnss_localization/ros/conversions.hpp"
@@ -52,10 +53,11 @@ struct Parameters {
   UkfParameters ukf;
   MotionParameters motion;
   GpsBiasParameters bias;
+  ComplementaryEkfParameters complementary;
 };
 
 /// Files in their order, later values over earlier ones. A file may hold the parameters flat, or by node as rosparam
-/// does (`particle_filter:`, `gps_bias:`).
+/// does (`particle_filter:` with `gps_bias:`, `complementary_ekf:`).
 YAML::Node merge_parameters(const Options& options) {
   YAML::Node merged(YAML::NodeType::Map);
   const auto merge = [&merged](const YAML::Node& map) {
@@ -70,9 +72,12 @@ YAML::Node merge_parameters(const Options& options) {
     }
     if (!map.IsMap() && !map.IsNull())
       throw std::runtime_error("--params " + file + ": must be a map of names to values");
-    for (const char* section : {"gps_bias", "particle_filter", "ukf"}) {
+    for (const std::string section : {"gps_bias", "particle_filter", "complementary_ekf", "ukf"}) {
       if (!map.IsMap() || !map[section].IsDefined()) continue;
-      merge(map[section]);
+      // Sections of other localizers may use the same names for other things.
+      if (section == options.localizer || (section == "gps_bias" && options.localizer == "particle_filter")) {
+        merge(map[section]);
+      }
       map.remove(section);
     }
     if (map.IsMap()) merge(map);
@@ -93,12 +98,15 @@ Parameters read_parameters(const Options& options) {
   ParameterReader reader(merge_parameters(options));
   for (const char* live_only : {"particle_cloud_rate", "estimate_timeout", "diagnostic_period"})
     reader.ignore(live_only);
-  reader.read(parameters.node).read(parameters.motion).read(parameters.bias);
-  if (options.localizer == "ukf") {
-    reader.read(parameters.ukf);
+  reader.read(parameters.node);
+  if (options.localizer == "complementary_ekf") {
+    reader.read(parameters.complementary);
     reader.ignore("seed");  // nothing in it is random
+  } else if (options.localizer == "ukf") {
+    reader.read(parameters.ukf).read(parameters.motion);
+    reader.ignore("seed");
   } else {
-    reader.read(parameters.filter);
+    reader.read(parameters.filter).read(parameters.motion).read(parameters.bias);
   }
   const auto faults = reader.finish();
   if (!faults.empty()) throw ParameterError("replay", faults);
@@ -200,10 +208,16 @@ class Replay {
   }
 
  private:
-  static std::unique_ptr<Localizer> make_localizer(const std::string& name, const Parameters& parameters) {
+  std::unique_ptr<Localizer> make_localizer(const std::string& name, const Parameters& parameters) {
     if (name == "particle_filter") return std::make_unique<ParticleFilter>(parameters.filter, parameters.motion);
     if (name == "ukf") return std::make_unique<Ukf>(parameters.ukf, parameters.motion);
-    throw std::runtime_error("--localizer " + name + ": no such localizer; there are particle_filter, ukf");
+    if (name == "complementary_ekf") {
+      auto filter = std::make_unique<ComplementaryEkf>(parameters.complementary);
+      complementary_ = filter.get();
+      return filter;
+    }
+    throw std::runtime_error("--localizer " + name +
+                             ": no such localizer; there are particle_filter, complementary_ekf, ukf");
   }
 
   /// Answers the pipeline's questions for the bias, as gps_bias_node does live, and writes what came of it.
@@ -228,6 +242,11 @@ class Replay {
       tf.transforms.push_back(to_map_to_odom(output, parameters_.node.frames, parameters_.node.transform_time_offset));
       write("tf", output.stamp, tf);
     }
+    if (complementary_) {
+      for (const BiasEstimate& bias : complementary_->take_bias_estimates()) {
+        write(topics::kBias, bias.stamp, to_message(bias, parameters_.node.frames.map));
+      }
+    }
     const std::vector<FixVerdict> verdicts = pipeline_.take_verdicts();
     for (const FixVerdict& verdict : verdicts) ++decisions_[to_string(verdict.decision)];
     for (const auto& status : to_status_messages(pipeline_, verdicts, to_ros(newest_), parameters_.node.frames.map)) {
@@ -241,6 +260,7 @@ class Replay {
   }
 
   Parameters parameters_;
+  ComplementaryEkf* complementary_{nullptr};  ///< the pipeline's localizer, where it is that one
   LocalizationPipeline pipeline_;
   BiasTracker bias_tracker_;
   rosbag::Bag bag_;
@@ -350,7 +370,7 @@ int main(int argc, char** argv) {
   CLI::App app("Runs a bag through a localizer offline; the same input, parameters and seed give the same output.");
   app.option_defaults()->always_capture_default();
   app.add_option("bag", options.input, "the bag to read")->required();
-  app.add_option("--localizer", options.localizer, "particle_filter, ukf");
+  app.add_option("--localizer", options.localizer, "particle_filter, complementary_ekf or ukf");
   app.add_option("--params", options.params, "YAML with the nodes' parameters; repeatable, later files win");
   app.add_option("--set", options.overrides, "one parameter, NAME=VALUE; repeatable");
   app.add_option("--output", options.output, "bag to write: odometry/filtered, gps/bias, status, tf");

@@ -12,6 +12,7 @@
 
 #include "matchers.hpp"
 #include "urban_gnss_localization/control/waypoint_controller.hpp"
+#include "urban_gnss_localization/filters/complementary_ekf.hpp"
 #include "urban_gnss_localization/filters/particle_filter.hpp"
 #include "urban_gnss_localization/filters/ukf.hpp"
 #include "urban_gnss_localization/pipeline/bias_pipeline.hpp"
@@ -150,6 +151,14 @@ TEST(Config, UkfStatesEveryDefault) {
   expect_states(values_of(load("ukf.yaml")), merged(defaults_of(UkfParameters()), defaults_of(MotionParameters())));
 }
 
+TEST(Config, ComplementaryEkfStatesEveryDefault) {
+  const Values file = values_of(load("complementary_ekf.yaml"));
+  expect_states(file, defaults_of(ComplementaryEkfParameters()));
+  EXPECT_EQ(joined(faults_in(merged(values_of(load("localization.yaml")), file), shell(), LocalizationParameters(),
+                             ComplementaryEkfParameters())),
+            kNoFault);
+}
+
 TEST(Config, GpsBiasStatesEveryDefault) {
   expect_states(values_of(load("gps_bias.yaml")), merged(frames(), defaults_of(BiasPipelineParameters())));
 }
@@ -232,9 +241,9 @@ TEST(Config, RosparamReadsTheSameValues) {
   const std::regex text_for_rosparam("[-+]?[0-9]+[eE].*|[-+]?[0-9.]+[eE][0-9].*");
   const std::regex boolean_for_rosparam("on|off|yes|no|y|n", std::regex::icase);
   for (const char* name :
-       {"localization.yaml", "particle_filter.yaml", "ukf.yaml", "gps_bias.yaml", "waypoint_controller.yaml",
-        "paper_field/localization.yaml", "paper_field/particle_filter.yaml", "paper_field/gps_bias.yaml",
-        "paper_field/waypoint_controller.yaml", "paper_field/simulator.yaml"}) {
+       {"localization.yaml", "particle_filter.yaml", "complementary_ekf.yaml", "ukf.yaml", "gps_bias.yaml",
+        "waypoint_controller.yaml", "paper_field/localization.yaml", "paper_field/particle_filter.yaml",
+        "paper_field/gps_bias.yaml", "paper_field/waypoint_controller.yaml", "paper_field/simulator.yaml"}) {
     for (const auto& [key, value] : values_of(load(name))) {
       const YAML::Node list = value.IsSequence() ? value : YAML::Load("[" + text_of(value) + "]");
       for (const auto& element : list) {
@@ -249,8 +258,8 @@ TEST(Config, RosparamReadsTheSameValues) {
 TEST(Config, EveryDefaultIsExplained) {
   const std::regex parameter("(\\w+):.*");
   const std::regex explained("\\w+: .*# \\S.*");
-  for (const char* name :
-       {"localization.yaml", "particle_filter.yaml", "ukf.yaml", "gps_bias.yaml", "waypoint_controller.yaml"}) {
+  for (const char* name : {"localization.yaml", "particle_filter.yaml", "complementary_ekf.yaml", "ukf.yaml",
+                           "gps_bias.yaml", "waypoint_controller.yaml"}) {
     std::istringstream lines(read_text(std::string("config/") + name));
     for (std::string line; std::getline(lines, line);) {
       if (!std::regex_match(line, parameter)) continue;

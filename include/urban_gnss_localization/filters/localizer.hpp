@@ -19,6 +19,7 @@ struct FixMeasurement {
   Eigen::Vector2d antenna_in_body{Eigen::Vector2d::Zero()};
   double bias_radius_m{0.0};  ///< r-hat, where a bias filter gave one
   double time_s{0.0};         ///< of the fix, since any fixed instant
+  Stamp stamp{0};             ///< of the fix, for what is published about it
 };
 
 /// How sure a localizer is of what it publishes. NaN and 0 where a method has no such number.

@@ -1,0 +1,68 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include "urban_gnss_localization/common/parameters.hpp"
+#include "urban_gnss_localization/motion/motion_model.hpp"
+
+namespace urban_gnss {
+
+/// Noise of the odometry, and what is systematically wrong with it. Densities are standard deviations after one second.
+struct DeadReckoningParameters {
+  double odom_speed_noise{0.02};        ///< share of the speed, /sqrt(Hz): diagonal of Sigma_v
+  double odom_yaw_rate_noise{0.03};     ///< share of the yaw rate, /sqrt(Hz): diagonal of Sigma_v
+  double odom_position_noise{0.05};     ///< m/sqrt(s) per axis, while moving: Sigma_N
+  double odom_heading_noise{0.003};     ///< rad/sqrt(s), while moving: Sigma_N
+  bool estimate_odometry_errors{true};  ///< speed scale and yaw-rate bias as states; false: the paper's (x, y, heading)
+  double odom_scale_sigma{0.02};        ///< 1, of the speed scale's error at the start
+  double odom_scale_walk{2e-4};         ///< 1/sqrt(s), how fast it changes
+  double odom_yaw_bias_sigma{0.005};    ///< rad/s, of the yaw rate's bias at the start
+  double odom_yaw_bias_walk{3e-5};      ///< rad/s/sqrt(s), how fast it changes
+
+  template <class V>
+  void visit(V& v) {
+    v("odom_speed_noise", odom_speed_noise, non_negative());
+    v("odom_yaw_rate_noise", odom_yaw_rate_noise, non_negative());
+    v("odom_position_noise", odom_position_noise, non_negative());
+    v("odom_heading_noise", odom_heading_noise, non_negative());
+    v("estimate_odometry_errors", estimate_odometry_errors);
+    v("odom_scale_sigma", odom_scale_sigma, non_negative());
+    v("odom_scale_walk", odom_scale_walk, non_negative());
+    v("odom_yaw_bias_sigma", odom_yaw_bias_sigma, non_negative());
+    v("odom_yaw_bias_walk", odom_yaw_bias_walk, non_negative());
+  }
+  void check(std::vector<std::string>&) const {}
+};
+
+/// What the odometry is wrong by: true speed = (1 + speed_scale) measured, true yaw rate = measured + yaw_rate_bias.
+struct OdometryErrors {
+  double speed_scale{0.0};          ///< 1
+  double yaw_rate_bias_radps{0.0};  ///< rad/s
+};
+
+/// Order of the error states: x (m), y (m), yaw (rad), speed scale (1), yaw-rate bias (rad/s).
+inline constexpr int kErrorStates = 5;
+using ErrorState = Eigen::Matrix<double, kErrorStates, 1>;
+using ErrorCovariance = Eigen::Matrix<double, kErrorStates, kErrorStates>;
+
+/// One step of dead reckoning: Kim et al. eq. (1), with the chord in place of the tangent, and the J and the
+/// K Sigma_v K' + Sigma_N of eq. (2), for the pose and the odometry's errors.
+struct DeadReckoningStep {
+  Pose2 pose;                  ///< moved
+  ErrorCovariance transition;  ///< J: how an error before the step shows after it
+  ErrorCovariance noise;       ///< of the step
+};
+
+/// Whether the wheels stand: the odometry then has no error, neither noise nor bias.
+bool is_standstill(const Twist2& twist);
+
+/// Dead-reckons `duration_s` >= 0 at the measured twist, corrected by `errors`. Without estimate_odometry_errors their
+/// rows of the noise are 0.
+DeadReckoningStep dead_reckon(const Pose2& pose, const OdometryErrors& errors, const Twist2& measured,
+                              double duration_s, const DeadReckoningParameters& parameters);
+
+/// Covariance of pose and odometry errors at a start whose pose has the given covariance.
+ErrorCovariance initial_error_covariance(const Eigen::Matrix3d& pose_covariance,
+                                         const DeadReckoningParameters& parameters);
+
+}  // namespace urban_gnss

@@ -1,0 +1,71 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <deque>
+
+#include "urban_gnss_localization/common/parameters.hpp"
+
+namespace urban_gnss {
+
+struct FixNoiseParameters {
+  bool adapt_fix_noise{true};             ///< enlarge the declared covariance as the fixes show; false: believe it
+  double fix_noise_horizon{20.0};         ///< s apart at which the errors of two fixes are taken for independent
+  double fix_noise_memory{60.0};          ///< count of fixes that the statistics are averaged over
+  double fix_noise_max_inflation{100.0};  ///< most that a covariance is multiplied by
+
+  template <class V>
+  void visit(V& v) {
+    v("adapt_fix_noise", adapt_fix_noise);
+    v("fix_noise_horizon", fix_noise_horizon, positive());
+    v("fix_noise_memory", fix_noise_memory, at_least(1.0));
+    v("fix_noise_max_inflation", fix_noise_max_inflation, at_least(1.0));
+  }
+  void check(std::vector<std::string>&) const {}
+};
+
+/// How much a fix with a coloured error is worth, from a variogram of the fixes against short-horizon odometry: half
+/// the mean square by which two fixes differ beyond what the robot moved, relative to their declared covariance, for
+/// neighbours (near) and for fixes `fix_noise_horizon` apart (far). White errors of the declared size give 1 and 1. An
+/// error of correlation rho from fix to fix has near = (1 - rho) far; averaging such fixes is worth as much as
+/// averaging white ones whose variance is (1 + rho) / (1 - rho) = (2 far - near) / near times larger. It depends on no
+/// estimate of a filter's, so that it cannot talk itself into anything.
+class FixNoiseMonitor {
+ public:
+  /// Requires parameters without faults.
+  explicit FixNoiseMonitor(const FixNoiseParameters& parameters) : parameters_(parameters) {}
+
+  /// Takes a fix: position (m) and declared covariance (m^2); the dead-reckoned place of the antenna (m, any origin,
+  /// same axes) and its accumulated variance (m^2), of which the difference between two fixes counts; the share of the
+  /// distance (1) that heading and scale may be wrong by; time (s), ascending.
+  void add(const Eigen::Vector2d& position, const Eigen::Matrix2d& covariance, const Eigen::Vector2d& dead_reckoned,
+           double dead_reckoned_variance_m2, double distance_share, double time_s);
+
+  void reset();
+
+  /// Factor on the declared covariance for estimation, at least 1; 1 until there are enough fixes.
+  double inflation() const;
+  double near() const { return near_.mean; }
+  double far() const { return far_.mean; }
+
+ private:
+  struct Fix {
+    Eigen::Vector2d residual;  ///< fix minus dead reckoning, m
+    Eigen::Vector2d place;     ///< dead-reckoned, m
+    Eigen::Matrix2d covariance;
+    double variance_m2;
+    double time_s;
+  };
+  struct Average {
+    double mean{1.0};
+    double count{0.0};
+    void add(double value, double memory);
+  };
+  static double ratio(const Fix& a, const Fix& b, double distance_share);
+
+  FixNoiseParameters parameters_;
+  std::deque<Fix> fixes_;
+  Average near_;
+  Average far_;
+};
+
+}  // namespace urban_gnss

@@ -1,0 +1,57 @@
+// The complementary filter of Kim et al. as a node. Parameters: LocalizerNodeParameters and ComplementaryEkfParameters;
+// config/complementary_ekf.yaml documents the latter. Beside what every localizer publishes: gps/bias and
+// gps/bias_markers.
+
+#include <visualization_msgs/MarkerArray.h>
+
+#include "urban_gnss_localization/filters/complementary_ekf.hpp"
+#include "urban_gnss_localization/ros/localizer_node.hpp"
+#include "urban_gnss_localization/ros/markers.hpp"
+#include "urban_gnss_localization/ros/node_parameters.hpp"
+#include "urban_gnss_localization/ros/topics.hpp"
+
+using namespace urban_gnss;
+
+namespace {
+
+class ComplementaryEkfNode {
+ public:
+  ComplementaryEkfNode(ros::NodeHandle& node, ros::NodeHandle& private_node) {
+    ComplementaryEkfParameters filter;
+    read_private_parameters(private_node, shell_parameters_, filter);
+    bias_publisher_ = node.advertise<urban_gnss_localization::GpsBias>(topics::kBias, 100);
+    marker_publisher_ = node.advertise<visualization_msgs::MarkerArray>(topics::kBiasMarkers, 2);
+    auto localizer = std::make_unique<ComplementaryEkf>(filter);
+    filter_ = localizer.get();
+    shell_ = std::make_unique<LocalizerNode>(node, private_node, shell_parameters_, std::move(localizer),
+                                             [this](const LocalizationOutput&) { publish_biases(); });
+  }
+
+ private:
+  void publish_biases() {
+    for (const BiasEstimate& bias : filter_->take_bias_estimates()) {
+      bias_publisher_.publish(to_message(bias, shell_parameters_.frames.map));
+      if (marker_publisher_.getNumSubscribers() > 0) {
+        marker_publisher_.publish(bias_markers(bias, shell_parameters_.frames.map));
+      }
+    }
+    if (filter_->is_gate_inert()) {
+      ROS_WARN_STREAM_THROTTLE(60.0, "gate inert: the fixes scatter far less than their covariance says; a bias below "
+                                         << filter_->smallest_detectable_jump_m() << " m is not found at once");
+    }
+  }
+
+  LocalizerNodeParameters shell_parameters_;
+  ros::Publisher bias_publisher_;
+  ros::Publisher marker_publisher_;
+  ComplementaryEkf* filter_{nullptr};  ///< owned by the shell's pipeline
+  std::unique_ptr<LocalizerNode> shell_;
+};
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  return run_node(argc, argv, "complementary_ekf", [](ros::NodeHandle& node, ros::NodeHandle& private_node) {
+    return std::make_shared<ComplementaryEkfNode>(node, private_node);
+  });
+}
