@@ -17,8 +17,9 @@ Eigen::Isometry3d to_isometry(const Pose2& pose) {
   return isometry;
 }
 
-bool is_usable(const SatelliteObservation& satellite) {
-  return satellite.tracked && std::isfinite(satellite.look.azimuth_rad) && satellite.look.elevation_rad > 0.0 &&
+/// Also one that is not tracked is looked at: that it is blocked explains why.
+bool has_direction(const SatelliteObservation& satellite) {
+  return std::isfinite(satellite.look.azimuth_rad) && satellite.look.elevation_rad > 0.0 &&
          satellite.look.elevation_rad <= 0.5 * kPi + 1e-6;
 }
 
@@ -58,12 +59,14 @@ OcclusionPipeline::OcclusionPipeline(const OcclusionPipelineParameters& paramete
     : parameters_(parameters),
       local_map_(parameters.local_map, parameters.voxels, parameters.aligner),
       voxel_tracer_(local_map_.map(), parameters.voxel_tracer),
-      covariance_(parameters.covariance) {}
+      covariance_(parameters.covariance),
+      antenna_in_base_(parameters.occlusion.antenna_offset[0], parameters.occlusion.antenna_offset[1],
+                       parameters.occlusion.antenna_offset[2]) {}
 
 CloudOutcome OcclusionPipeline::add_cloud(Stamp stamp, const PointCloud& cloud, const Eigen::Isometry3d& sensor_in_base,
                                           const Eigen::Isometry3d& base_in_odom) {
   CloudOutcome outcome;
-  if (last_cloud_ && stamp <= *last_cloud_) {
+  if (last_cloud_ && stamp <= *last_cloud_ && to_seconds(*last_cloud_ - stamp) <= parameters_.occlusion.map_timeout) {
     outcome.decision = CloudDecision::kNotNewer;
     return outcome;
   }
@@ -85,6 +88,10 @@ InsertReport OcclusionPipeline::add_prior(const PointCloud& points, const Pose2&
   has_prior_ = true;
   kd_tracer_.reset();
   return local_map_.add_prior(transformed(points, to_isometry(inverse(odom_in_world))));
+}
+
+void OcclusionPipeline::set_antenna(const Eigen::Vector3d& place) {
+  if (place.allFinite()) antenna_in_base_ = place;
 }
 
 void OcclusionPipeline::set_alignment(const WorldAlignment& alignment) {
@@ -116,7 +123,7 @@ std::optional<AntennaPose> OcclusionPipeline::antenna_at(Stamp stamp,
   const OcclusionParameters& p = parameters_.occlusion;
   if (!last_cloud_ && !has_prior_) {
     append(missing, "clouds");
-  } else if (!has_prior_ && to_seconds(stamp - *last_cloud_) > p.map_timeout) {
+  } else if (!has_prior_ && std::abs(to_seconds(stamp - *last_cloud_)) > p.map_timeout) {
     append(missing, "a recent cloud");
   }
   if (!base_in_odom || !base_in_odom->matrix().allFinite()) append(missing, "the robot's pose in the odometry frame");
@@ -124,8 +131,7 @@ std::optional<AntennaPose> OcclusionPipeline::antenna_at(Stamp stamp,
   if (!missing.empty()) return std::nullopt;
 
   AntennaPose antenna;
-  const Eigen::Vector3d offset(p.antenna_offset[0], p.antenna_offset[1], p.antenna_offset[2]);
-  antenna.position = local_map_.correction() * *base_in_odom * offset;
+  antenna.position = local_map_.correction() * *base_in_odom * antenna_in_base_;
   antenna.position_sigma_m = p.antenna_sigma;
   const Eigen::Vector3d corrected_x = local_map_.correction().linear() * Eigen::Vector3d::UnitX();
   antenna.east_yaw_rad = wrap_angle(std::atan2(corrected_x.y(), corrected_x.x()) - alignment_->odom_in_world.yaw);
@@ -155,9 +161,8 @@ FixAssessment OcclusionPipeline::assess(Stamp stamp, const std::optional<Eigen::
                                         const std::optional<Eigen::Isometry3d>& base_in_odom) {
   FixAssessment assessment;
   assessment.stamp = stamp;
-  const bool has_satellites =
-      !satellites_.empty() &&
-      std::abs(to_seconds(stamp - satellites_stamp_)) <= parameters_.occlusion.satellites_timeout;
+  const bool has_satellites = !satellites_.empty() && std::abs(to_seconds(stamp - satellites_stamp_)) <=
+                                                          parameters_.occlusion.satellites_timeout;
   if (has_satellites) assessment.satellites = satellites_;
   const auto antenna = antenna_at(stamp, base_in_odom, assessment.missing);
   if (!has_satellites) append(assessment.missing, "satellites");
@@ -168,10 +173,9 @@ FixAssessment OcclusionPipeline::assess(Stamp stamp, const std::optional<Eigen::
     assessment.antenna = *antenna;
     for (std::size_t i = 0; i < assessment.satellites.size(); ++i) {
       SatelliteObservation& satellite = assessment.satellites[i];
-      if (!is_usable(satellite)) continue;
-      assessment.visibilities[i] =
-          assess_visibility(tracer(), local_map_.map().observed_space(), *antenna, satellite.look,
-                            angle_resolution_rad_, parameters_.visibility);
+      if (!has_direction(satellite)) continue;
+      assessment.visibilities[i] = assess_visibility(tracer(), local_map_.map().observed_space(), *antenna,
+                                                     satellite.look, angle_resolution_rad_, parameters_.visibility);
       satellite.blocked_fraction = assessment.visibilities[i].blocked_fraction;
       satellite.known_fraction = assessment.visibilities[i].known_fraction;
     }

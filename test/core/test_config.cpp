@@ -17,6 +17,7 @@
 #include "urban_gnss_localization/filters/ukf.hpp"
 #include "urban_gnss_localization/pipeline/bias_pipeline.hpp"
 #include "urban_gnss_localization/pipeline/localization_pipeline.hpp"
+#include "urban_gnss_localization/pipeline/occlusion_pipeline.hpp"
 #include "urban_gnss_localization/simulation/city_simulator.hpp"
 #include "urban_gnss_localization/simulation/paper_field.hpp"
 #include "urban_gnss_localization/simulation/scenario_world.hpp"
@@ -132,6 +133,7 @@ Values frames() { return declared_in("include/urban_gnss_localization/ros/conver
 Values shell() { return merged(frames(), declared_in("include/urban_gnss_localization/ros/localizer_node.hpp")); }
 Values filter_node() { return merged(shell(), declared_in("src/nodes/particle_filter_node.cpp")); }
 Values controller_node() { return declared_in("src/nodes/waypoint_controller_node.cpp"); }
+Values occlusion_node() { return merged(frames(), declared_in("src/nodes/occlusion_node.cpp")); }
 Values simulator_node() {
   return merged(merged(frames(), declared_in("include/urban_gnss_localization/ros/simulation_messages.hpp")),
                 declared_in("src/nodes/simulator_node.cpp"));
@@ -166,6 +168,20 @@ TEST(Config, GpsBiasStatesEveryDefault) {
 TEST(Config, WaypointControllerStatesEveryDefault) {
   expect_states(values_of(load("waypoint_controller.yaml")),
                 merged(controller_node(), defaults_of(WaypointControllerParameters())));
+}
+
+TEST(Config, OcclusionStatesEveryDefault) {
+  const Values file = values_of(load("occlusion.yaml"));
+  // Each group by itself, so that a name that two of them use is found.
+  const OcclusionPipelineParameters p;
+  Values defaults = occlusion_node();
+  for (const Values& group :
+       {defaults_of(p.occlusion), defaults_of(p.visibility), defaults_of(p.local_map), defaults_of(p.voxels),
+        defaults_of(p.aligner), defaults_of(p.voxel_tracer), defaults_of(p.covariance)}) {
+    defaults = merged(defaults, group);
+  }
+  expect_states(file, defaults);
+  EXPECT_EQ(joined(faults_in(file, occlusion_node(), p)), kNoFault);
 }
 
 TEST(Config, DefaultsAreReadWithoutFault) {
@@ -242,8 +258,9 @@ TEST(Config, RosparamReadsTheSameValues) {
   const std::regex boolean_for_rosparam("on|off|yes|no|y|n", std::regex::icase);
   for (const char* name :
        {"localization.yaml", "particle_filter.yaml", "complementary_ekf.yaml", "ukf.yaml", "gps_bias.yaml",
-        "waypoint_controller.yaml", "paper_field/localization.yaml", "paper_field/particle_filter.yaml",
-        "paper_field/gps_bias.yaml", "paper_field/waypoint_controller.yaml", "paper_field/simulator.yaml"}) {
+        "occlusion.yaml", "waypoint_controller.yaml", "paper_field/localization.yaml",
+        "paper_field/particle_filter.yaml", "paper_field/gps_bias.yaml", "paper_field/waypoint_controller.yaml",
+        "paper_field/simulator.yaml"}) {
     for (const auto& [key, value] : values_of(load(name))) {
       const YAML::Node list = value.IsSequence() ? value : YAML::Load("[" + text_of(value) + "]");
       for (const auto& element : list) {
@@ -259,7 +276,7 @@ TEST(Config, EveryDefaultIsExplained) {
   const std::regex parameter("(\\w+):.*");
   const std::regex explained("\\w+: .*# \\S.*");
   for (const char* name : {"localization.yaml", "particle_filter.yaml", "complementary_ekf.yaml", "ukf.yaml",
-                           "gps_bias.yaml", "waypoint_controller.yaml"}) {
+                           "gps_bias.yaml", "occlusion.yaml", "waypoint_controller.yaml"}) {
     std::istringstream lines(read_text(std::string("config/") + name));
     for (std::string line; std::getline(lines, line);) {
       if (!std::regex_match(line, parameter)) continue;

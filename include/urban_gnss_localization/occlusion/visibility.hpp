@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -41,7 +42,8 @@ struct SatelliteVisibility {
   double blocked_fraction{0.0};  ///< of the rays; vegetation counts as the share of permeable_loss that it is
   double known_fraction{0.0};    ///< of the way that has been looked at, or blocked
   bool is_blocked_ahead{false};  ///< the verdict of the central ray alone
-  double range_m{0.0};           ///< of the central ray to what blocks it; infinite where nothing does
+  /// m, of the central ray to what blocks it; infinite where nothing does
+  double range_m{std::numeric_limits<double>::infinity()};
 };
 
 /// Midpoints of `count` slices of equal probability of the standard normal distribution, ascending.

@@ -28,13 +28,13 @@ EnumNames<TracerChoice> enum_names(TracerChoice);
 struct OcclusionParameters {
   TracerChoice tracer{TracerChoice::kVoxel};
   std::vector<double> antenna_offset{0.0, 0.0, 0.0};  ///< m, in base_link_frame
-  double antenna_sigma{0.3};        ///< m per horizontal axis: how well the antenna is placed in the map
-  double heading_sigma{0.05};       ///< rad, at least that much is not known of the heading
-  double heading_timeout{5.0};      ///< s, an older heading is not used
-  double satellites_timeout{2.0};   ///< s, older satellites are not used for a fix
-  double map_timeout{60.0};         ///< s without a cloud after which the map is no longer believed
-  int sky_azimuths{72};             ///< directions of the skyline, where there are no satellites and for the sky plot
-  double sky_mask{0.17};            ///< rad, elevation from which the sky counts
+  double antenna_sigma{0.3};       ///< m per horizontal axis: how well the antenna is placed in the map
+  double heading_sigma{0.05};      ///< rad, at least that much is not known of the heading
+  double heading_timeout{5.0};     ///< s, an older heading is not used
+  double satellites_timeout{2.0};  ///< s, older satellites are not used for a fix
+  double map_timeout{60.0};        ///< s without a cloud after which the map is no longer believed
+  int sky_azimuths{72};            ///< directions of the skyline, where there are no satellites and for the sky plot
+  double sky_mask{0.17};           ///< rad, elevation from which the sky counts
 
   template <class V>
   void visit(V& v) {
@@ -77,7 +77,7 @@ struct OcclusionPipelineParameters {
 /// How the odometry frame lies in the world, from a localizer or a compass.
 struct WorldAlignment {
   Stamp stamp{0};
-  Pose2 odom_in_world;          ///< map -> odom; of it the yaw is used, and the place where there is a prior map
+  Pose2 odom_in_world;  ///< map -> odom; of it the yaw is used, and the place where there is a prior map
   double yaw_sigma_rad{0.0};
 };
 
@@ -101,25 +101,30 @@ struct FixAssessment {
   std::string missing;                            ///< what was not, for the user; empty where all was
 };
 
-/// Clouds, satellites and fixes in, honest covariances out (Maier & Kleiner 2010): the map is built in the odometry frame,
-/// whose heading error turns the sky; stamps are those of the messages.
+/// Clouds, satellites and fixes in, honest covariances out (Maier & Kleiner 2010): the map is built in the odometry
+/// frame, whose heading error turns the sky; stamps are those of the messages.
 class OcclusionPipeline {
  public:
   /// Requires parameters without faults.
   explicit OcclusionPipeline(const OcclusionPipelineParameters& parameters);
+  OcclusionPipeline(const OcclusionPipeline&) = delete;  // its tracer refers to its map
+  OcclusionPipeline& operator=(const OcclusionPipeline&) = delete;
 
-  /// A cloud in the sensor's frame (m), with the robot's pose in the odometry frame at the cloud's own stamp.
+  /// A cloud in the sensor's frame (m), with the robot's pose in the odometry frame at the cloud's own stamp. One that
+  /// is older than the last by more than map_timeout is taken: the last one's stamp was wrong.
   CloudOutcome add_cloud(Stamp stamp, const PointCloud& cloud, const Eigen::Isometry3d& sensor_in_base,
                          const Eigen::Isometry3d& base_in_odom);
   /// A map that was there before, in the world's axes; turned into the odometry frame by `odom_in_world`.
   InsertReport add_prior(const PointCloud& points, const Pose2& odom_in_world);
+  /// The antenna's place in base_link, m, over antenna_offset.
+  void set_antenna(const Eigen::Vector3d& place);
   /// Ignored where it is not finite.
   void set_alignment(const WorldAlignment& alignment);
   /// Angles that are not finite are left out. `angle_resolution_rad`: step that the receiver rounds to; 0 if unknown.
   void set_satellites(Stamp stamp, std::vector<SatelliteObservation> satellites, double angle_resolution_rad);
 
-  /// A fix with the covariance that its receiver claims (m^2, east and north), and the robot's pose in the odometry frame
-  /// at its stamp, where that is known.
+  /// A fix with the covariance that its receiver claims (m^2, east and north), and the robot's pose in the odometry
+  /// frame at its stamp, where that is known.
   FixAssessment assess(Stamp stamp, const std::optional<Eigen::Matrix2d>& claimed,
                        const std::optional<Eigen::Isometry3d>& base_in_odom);
 
@@ -143,6 +148,7 @@ class OcclusionPipeline {
   VoxelRayTracer voxel_tracer_;
   mutable std::unique_ptr<KdTreeRayTracer> kd_tracer_;  ///< of the map as it is; made when asked for
   GnssCovarianceModel covariance_;
+  Eigen::Vector3d antenna_in_base_;
   std::optional<Stamp> last_cloud_;
   std::optional<WorldAlignment> alignment_;
   bool has_prior_{false};

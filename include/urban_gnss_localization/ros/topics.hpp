@@ -35,6 +35,11 @@ inline constexpr char kTrueFixError[] = "ground_truth/gps_error";
 inline constexpr char kTrueShadow[] = "ground_truth/in_shadow";
 inline constexpr char kTrueSignals[] = "ground_truth/signal_paths";
 inline constexpr char kPoints[] = "points";
+inline constexpr char kWeightedFix[] = "gps/fix_weighted";
+inline constexpr char kVisibility[] = "gps/visibility";
+inline constexpr char kVisibilityMarkers[] = "gps/visibility_markers";
+inline constexpr char kSkyPlot[] = "gps/sky_plot";
+inline constexpr char kOcclusionMap[] = "occlusion_map";
 inline constexpr char kWorld[] = "world_markers";
 
 }  // namespace urban_gnss::topics

@@ -1,0 +1,70 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <functional>
+#include <vector>
+
+#include "urban_gnss_localization/evaluation/trajectory.hpp"
+#include "urban_gnss_localization/filters/ukf.hpp"
+#include "urban_gnss_localization/pipeline/localization_pipeline.hpp"
+#include "urban_gnss_localization/pipeline/occlusion_pipeline.hpp"
+#include "urban_gnss_localization/simulation/scenario.hpp"
+
+namespace urban_gnss {
+
+/// What the comparison of Maier and Kleiner 2010, Tables I and II, depends on, the scenario aside.
+struct OcclusionExperimentConditions {
+  OcclusionPipelineParameters occlusion;  ///< model and antenna are replaced
+  UkfParameters ukf;
+  MotionParameters motion;
+  LocalizationParameters localization;  ///< datum and antenna are replaced by the scenario's
+  int cloud_every{5};                   ///< of a spinning lidar's scans, one in so many goes into the maps
+};
+
+/// The models that are compared, in the order of OcclusionRun::models.
+inline constexpr std::array<CovarianceModel, 3> kComparedModels{CovarianceModel::kConventional, CovarianceModel::kPaper,
+                                                                CovarianceModel::kSoft};
+
+/// A fix as one model weighed it, with the truth about it.
+struct WeighedFix {
+  Stamp stamp{0};
+  Eigen::Vector2d error_m{Eigen::Vector2d::Zero()};         ///< east, north
+  Eigen::Matrix2d claimed{Eigen::Matrix2d::Identity()};     ///< by the receiver, m^2
+  Eigen::Matrix2d covariance{Eigen::Matrix2d::Identity()};  ///< by the model, m^2
+  bool is_good{true};                                       ///< the model's verdict
+  bool has_map{false};                                      ///< map and heading were there
+};
+
+/// How the map's verdict on tracked satellites compares with their true line of sight.
+struct LineOfSightTally {
+  /// [has a line of sight][the map says so]; blocked_threshold divides.
+  std::array<std::array<std::size_t, 2>, 2> counts{};
+  std::array<double, 2> known_sum{};  ///< of the known fractions, by line of sight
+
+  std::size_t count(bool has_line_of_sight) const {
+    return counts[has_line_of_sight][0] + counts[has_line_of_sight][1];
+  }
+};
+
+struct OcclusionModelRun {
+  std::vector<WeighedFix> fixes;
+  Trajectory estimate;
+  LineOfSightTally satellites;
+};
+
+/// One drive through a scenario, every model on the same measurements. All in the scenario's map frame.
+struct OcclusionRun {
+  Trajectory truth;
+  Trajectory odometry;  ///< alone, from where the conventional model's filter started
+  std::array<OcclusionModelRun, kComparedModels.size()> models;
+};
+
+/// Drives the scenario; for each model, an OcclusionPipeline weighs the fixes and a UKF uses them, whose heading turns
+/// that pipeline's sky. Nothing but the results sees the truth: the filters start from fixes and motion. The
+/// conventional model makes no use of a map and is given no clouds. `on_progress` is told the share done, 0 to 1.
+/// Throws what CitySimulator throws.
+OcclusionRun run_occlusion_experiment(const Scenario& scenario, const OcclusionExperimentConditions& conditions,
+                                      const std::function<void(double)>& on_progress);
+
+}  // namespace urban_gnss

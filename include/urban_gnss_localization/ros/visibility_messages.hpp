@@ -1,0 +1,52 @@
+#pragma once
+
+#include <sensor_msgs/Image.h>
+#include <sensor_msgs/NavSatFix.h>
+#include <sensor_msgs/PointCloud2.h>
+#include <urban_gnss_localization/SatelliteArray.h>
+#include <urban_gnss_localization/Visibility.h>
+#include <visualization_msgs/MarkerArray.h>
+
+#include <Eigen/Geometry>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "urban_gnss_localization/pipeline/occlusion_pipeline.hpp"
+
+/// Between messages and the occlusion pipeline.
+namespace urban_gnss {
+
+/// The points of a cloud with fields x, y and z, in whatever place and order, as 32- or 64-bit floating point numbers;
+/// points that are not finite are kept. Throws std::invalid_argument that names what is wrong: a field missing or of
+/// another type, big-endian data, less data than height and row_step say.
+PointCloud to_point_cloud(const sensor_msgs::PointCloud2& message);
+sensor_msgs::PointCloud2 to_message(const PointCloud& cloud, const ros::Time& time, const std::string& frame);
+
+std::vector<SatelliteObservation> to_observations(const urban_gnss_localization::SatelliteArray& message);
+
+/// The receiver's claim, east and north, m^2; nothing where it has none that can be used (F12).
+std::optional<Eigen::Matrix2d> claimed_covariance(const sensor_msgs::NavSatFix& fix);
+
+/// The fix with the weighted covariance in the place of the receiver's; the height's variance grows by the same factor
+/// as the horizontal ones.
+sensor_msgs::NavSatFix weighted_fix(const sensor_msgs::NavSatFix& fix, const GnssCovariance& covariance);
+
+urban_gnss_localization::Visibility to_message(const FixAssessment& assessment,
+                                               const std::optional<Eigen::Matrix2d>& claimed,
+                                               const GnssCovarianceParameters& parameters, const ros::Time& time,
+                                               const std::string& frame);
+
+/// Rays to the satellites from the antenna, in the frame of the map of the surroundings: green free, orange blocked (up
+/// to what blocks), grey unknown.
+visualization_msgs::MarkerArray ray_markers(const FixAssessment& assessment,
+                                            const urban_gnss_localization::Visibility& visibility,
+                                            const ros::Time& time, const std::string& frame);
+
+/// The sky with north up and east right, zenith in the middle: what the map blocks dark (`skyline`, rad, by equal steps
+/// of azimuth; empty without a map), satellites as discs in the colours of ray_markers(), 8-bit RGB, `size` pixels
+/// square.
+sensor_msgs::Image sky_plot(const urban_gnss_localization::Visibility& visibility, const std::vector<double>& skyline,
+                            int size);
+
+}  // namespace urban_gnss

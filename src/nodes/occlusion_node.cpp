@@ -1,0 +1,368 @@
+// Weighs fixes by what stands between the antenna and the satellites (Maier & Kleiner 2010): points, gps/satellites,
+// gps/fix and tf in; gps/fix_weighted, gps/visibility, the map, rays and a sky plot out. Parameters:
+// OcclusionPipelineParameters, Frames and the ones below; config/occlusion.yaml documents each.
+
+#include <diagnostic_updater/diagnostic_updater.h>
+#include <nav_msgs/Odometry.h>
+#include <ros/ros.h>
+#include <std_srvs/Trigger.h>
+#include <tf2_ros/transform_listener.h>
+#include <urban_gnss_localization/SaveMap.h>
+
+#include <deque>
+
+#include "urban_gnss_localization/ros/conversions.hpp"
+#include "urban_gnss_localization/ros/event_log.hpp"
+#include "urban_gnss_localization/ros/input_watch.hpp"
+#include "urban_gnss_localization/ros/node_parameters.hpp"
+#include "urban_gnss_localization/ros/topics.hpp"
+#include "urban_gnss_localization/ros/visibility_messages.hpp"
+
+using namespace urban_gnss;
+
+namespace {
+
+struct NodeParameters {
+  std::string prior_map{""};       ///< .pcd file, in the axes of the world about the map frame's origin
+  double tf_timeout{0.5};          ///< s of stamps that a cloud or a fix waits for its transform
+  int cloud_queue{5};              ///< clouds that wait at most; more are dropped, the oldest first
+  double time_jump{1.0};           ///< s, a fix older than the last by more is a clock that was set back
+  double map_publish_period{1.0};  ///< s between publications of the map, where somebody listens
+  int sky_plot_size{480};          ///< pixels
+
+  template <class V>
+  void visit(V& v) {
+    v("prior_map", prior_map);
+    v("tf_timeout", tf_timeout, non_negative());
+    v("cloud_queue", cloud_queue, between(1, 1000));
+    v("time_jump", time_jump, positive());
+    v("map_publish_period", map_publish_period, positive());
+    v("sky_plot_size", sky_plot_size, between(50, 4000));
+  }
+  void check(std::vector<std::string>&) const {}
+};
+
+class OcclusionNode {
+ public:
+  OcclusionNode(ros::NodeHandle& node, ros::NodeHandle& private_node)
+      : tf_listener_(tf_buffer_), fix_stamps_(1.0), diagnostics_(ros::NodeHandle(), private_node) {
+    OcclusionPipelineParameters pipeline;
+    read_private_parameters(private_node, pipeline, frames_, parameters_);
+    if (!parameters_.prior_map.empty()) prior_ = read_pcd(parameters_.prior_map);
+    pipeline_ = std::make_unique<OcclusionPipeline>(pipeline);
+    fix_stamps_ = StampMonitor(parameters_.time_jump);
+    antenna_known_ = pipeline.occlusion.antenna_offset != std::vector<double>{0.0, 0.0, 0.0};
+
+    fix_publisher_ = node.advertise<sensor_msgs::NavSatFix>(topics::kWeightedFix, 100);
+    visibility_publisher_ = node.advertise<urban_gnss_localization::Visibility>(topics::kVisibility, 100);
+    marker_publisher_ = node.advertise<visualization_msgs::MarkerArray>(topics::kVisibilityMarkers, 2);
+    sky_publisher_ = node.advertise<sensor_msgs::Image>(topics::kSkyPlot, 2);
+    map_publisher_ = node.advertise<sensor_msgs::PointCloud2>(topics::kOcclusionMap, 1, true);
+    const auto no_delay = ros::TransportHints().tcpNoDelay();
+    fix_subscriber_ = node.subscribe(topics::kFix, 100, &OcclusionNode::on_fix, this, no_delay);
+    fix_watch_.set_subscriber(fix_subscriber_);
+    satellites_subscriber_ = node.subscribe(topics::kSatellites, 100, &OcclusionNode::on_satellites, this, no_delay);
+    cloud_subscriber_ = node.subscribe(topics::kPoints, 10, &OcclusionNode::on_cloud, this, no_delay);
+    estimate_subscriber_ = node.subscribe(topics::kEstimate, 100, &OcclusionNode::on_estimate, this, no_delay);
+    clear_service_ = private_node.advertiseService("clear_map", &OcclusionNode::clear_map, this);
+    save_service_ = private_node.advertiseService("save_map", &OcclusionNode::save_map, this);
+
+    diagnostics_.setHardwareID("none");
+    diagnostics_.add("occlusion", this, &OcclusionNode::diagnose);
+    work_timer_ = node.createWallTimer(ros::WallDuration(0.02), [this](const ros::WallTimerEvent&) { work(); });
+    second_timer_ = node.createWallTimer(ros::WallDuration(1.0), [this](const ros::WallTimerEvent&) {
+      fix_watch_.check_publishers();
+      diagnostics_.update();
+    });
+    map_timer_ = node.createWallTimer(ros::WallDuration(parameters_.map_publish_period),
+                                      [this](const ros::WallTimerEvent&) { publish_map(); });
+  }
+
+ private:
+  /// Nothing where tf does not know it (yet). Never waits (F24).
+  std::optional<Eigen::Isometry3d> transform(const std::string& to, const std::string& from, const ros::Time& time) {
+    try {
+      const auto message = tf_buffer_.lookupTransform(to, from, time).transform;
+      const Eigen::Quaterniond rotation(message.rotation.w, message.rotation.x, message.rotation.y, message.rotation.z);
+      Eigen::Isometry3d isometry = Eigen::Isometry3d::Identity();
+      isometry.translate(Eigen::Vector3d(message.translation.x, message.translation.y, message.translation.z));
+      isometry.rotate(rotation);
+      return isometry;
+    } catch (const tf2::TransformException& error) {
+      tf_fault_ = error.what();
+      return std::nullopt;
+    }
+  }
+
+  void on_cloud(const sensor_msgs::PointCloud2ConstPtr& message) {
+    clouds_.push_back(message);
+    ++clouds_received_;
+    while (clouds_.size() > static_cast<std::size_t>(parameters_.cloud_queue)) {
+      clouds_.pop_front();
+      ++clouds_dropped_;
+      ROS_WARN_STREAM_THROTTLE(5.0, clouds_dropped_ << " of " << clouds_received_
+                                                    << " clouds dropped: they come faster than they go into the map, "
+                                                       "or tf does not follow; last: "
+                                                    << tf_fault_);
+    }
+    work();
+  }
+
+  void on_satellites(const urban_gnss_localization::SatelliteArray& message) {
+    pipeline_->set_satellites(to_stamp(message.header.stamp), to_observations(message), message.angle_resolution);
+  }
+
+  /// How well the localizer knows the heading; the heading itself comes from tf, which has it at every stamp.
+  void on_estimate(const nav_msgs::Odometry& message) {
+    const double variance = message.pose.covariance[35];
+    yaw_sigma_ = std::isfinite(variance) && variance >= 0.0 ? std::sqrt(variance) : 0.0;
+  }
+
+  void on_fix(const sensor_msgs::NavSatFix& message) {
+    fix_watch_.observe_frame(message.header.frame_id);
+    const bool is_newer = fix_stamps_.accept(to_stamp(message.header.stamp), [this](Stamp back) {
+      ROS_WARN_STREAM("the clock was set back by " << to_seconds(back) << " s: started anew");
+      start_anew();
+      return true;
+    });
+    if (!is_newer) {
+      ROS_WARN_STREAM_THROTTLE(5.0, "a fix is not newer than the one before it; left out");
+      return;
+    }
+    fixes_.push_back(message);
+    newest_ = std::max(newest_, message.header.stamp);
+    work();
+  }
+
+  void start_anew() {
+    pipeline_->reset();
+    prior_is_in_ = false;
+    clouds_.clear();
+    fixes_.clear();
+    tf_buffer_.clear();
+    newest_ = ros::Time();
+    yaw_sigma_ = 0.0;
+  }
+
+  /// Whether what has this stamp need not wait for its transform any longer. By stamps, so that a bag that is played
+  /// fast or slowly gives the same.
+  bool is_overdue(const ros::Time& stamp) const { return newest_ > stamp + ros::Duration(parameters_.tf_timeout); }
+
+  void work() {
+    update_alignment();
+    while (!clouds_.empty() && insert(*clouds_.front())) clouds_.pop_front();
+    while (!fixes_.empty() && assess(fixes_.front())) fixes_.pop_front();
+  }
+
+  void update_alignment() {
+    const auto odom_in_map = transform(frames_.map, frames_.odom, ros::Time(0));
+    if (!odom_in_map) return;
+    WorldAlignment alignment;
+    const Eigen::Vector3d x = odom_in_map->linear().col(0);
+    alignment.odom_in_world = {odom_in_map->translation().x(), odom_in_map->translation().y(),
+                               std::atan2(x.y(), x.x())};
+    alignment.yaw_sigma_rad = yaw_sigma_;
+    alignment.stamp = to_stamp(newest_);
+    try {
+      const auto stamp = tf_buffer_.lookupTransform(frames_.map, frames_.odom, ros::Time(0)).header.stamp;
+      if (!stamp.isZero()) alignment.stamp = to_stamp(stamp);  // a static transform has none: it always holds
+    } catch (const tf2::TransformException&) {
+      return;
+    }
+    pipeline_->set_alignment(alignment);
+    if (!prior_.empty() && !prior_is_in_) {
+      prior_is_in_ = true;
+      pipeline_->add_prior(prior_, alignment.odom_in_world);
+    }
+  }
+
+  /// Whether the cloud is settled: in the map, or to be forgotten.
+  bool insert(const sensor_msgs::PointCloud2& message) {
+    const auto base = transform(frames_.odom, frames_.base_link, message.header.stamp);
+    const auto sensor = transform(frames_.base_link, message.header.frame_id, message.header.stamp);
+    if (!base || !sensor) {
+      if (!is_overdue(message.header.stamp)) return false;
+      ++clouds_dropped_;
+      ROS_WARN_STREAM_THROTTLE(5.0, "cloud left out, no transform at its stamp: " << tf_fault_);
+      return true;
+    }
+    try {
+      const CloudOutcome outcome =
+          pipeline_->add_cloud(to_stamp(message.header.stamp), to_point_cloud(message), *sensor, *base);
+      report(outcome);
+    } catch (const std::invalid_argument& error) {
+      ++clouds_dropped_;
+      ROS_WARN_STREAM_THROTTLE(5.0, topics::kPoints << " left out: " << error.what());
+    }
+    return true;
+  }
+
+  void report(const CloudOutcome& outcome) {
+    if (outcome.decision != CloudDecision::kInserted) {
+      ++clouds_dropped_;
+      ROS_WARN_STREAM_THROTTLE(5.0, "cloud left out: " << to_string(outcome.decision));
+      return;
+    }
+    ++clouds_inserted_;
+    if (outcome.scan.insertion.dropped_by_limit > 0) {
+      ROS_WARN_STREAM_THROTTLE(10.0, "max_voxels is too small for the window: "
+                                         << outcome.scan.insertion.dropped_by_limit << " voxels dropped");
+    }
+    const Alignment& alignment = outcome.scan.alignment;
+    if (!outcome.scan.is_keyframe || alignment.decision == AlignmentDecision::kNotTried) return;
+    ++alignments_tried_;
+    last_alignment_ = enum_name(alignment.decision);
+    if (alignment.is_accepted()) {
+      ++alignments_accepted_;
+    } else {
+      ROS_INFO_STREAM_THROTTLE(10.0, "scan not aligned, odometry used: " << alignment.reason);
+    }
+  }
+
+  /// Whether the fix is settled and published.
+  bool assess(const sensor_msgs::NavSatFix& message) {
+    const ros::Time stamp = message.header.stamp;
+    const bool has_position = message.status.status >= sensor_msgs::NavSatStatus::STATUS_FIX &&
+                              std::isfinite(message.latitude) && std::isfinite(message.longitude);
+    if (!has_position) {  // nothing to weigh; who listens shall see what the receiver says
+      fix_publisher_.publish(message);
+      return true;
+    }
+    const auto base = transform(frames_.odom, frames_.base_link, stamp);
+    if (!base && !is_overdue(stamp) && tf_is_there()) return false;
+    if (!antenna_known_) place_antenna(message);
+    const auto claimed = claimed_covariance(message);
+    const FixAssessment assessment = pipeline_->assess(to_stamp(stamp), claimed, base);
+    missing_ = assessment.missing;
+    source_ = assessment.covariance.source;
+    ++fixes_assessed_;
+    if (!assessment.missing.empty()) {
+      ROS_WARN_STREAM_THROTTLE(
+          10.0, "without " << assessment.missing << ": weighed by " << to_string(assessment.covariance.source));
+    }
+    fix_publisher_.publish(weighted_fix(message, assessment.covariance));
+    const auto visibility = to_message(assessment, claimed, pipeline_->parameters().covariance, stamp, frames_.odom);
+    visibility_publisher_.publish(visibility);
+    if (marker_publisher_.getNumSubscribers() > 0) {
+      marker_publisher_.publish(ray_markers(assessment, visibility, stamp, frames_.odom));
+    }
+    if (sky_publisher_.getNumSubscribers() > 0) {
+      const auto skyline = assessment.has_map ? pipeline_->skyline_at(assessment.antenna) : std::vector<double>();
+      sky_publisher_.publish(sky_plot(visibility, skyline, parameters_.sky_plot_size));
+    }
+    return true;
+  }
+
+  bool tf_is_there() const { return tf_buffer_.canTransform(frames_.odom, frames_.base_link, ros::Time(0)); }
+
+  /// From tf, once it is there; until then the antenna stays in base_link's place.
+  void place_antenna(const sensor_msgs::NavSatFix& message) {
+    const std::string& frame = message.header.frame_id;
+    if (const auto antenna = transform(frames_.base_link, frame, message.header.stamp)) {
+      const Eigen::Vector3d place = antenna->translation();
+      pipeline_->set_antenna(place);
+      antenna_known_ = true;
+      ROS_INFO_STREAM("antenna at " << place.transpose() << " m in " << frames_.base_link);
+      return;
+    }
+    ROS_WARN_STREAM_THROTTLE(10.0, "no transform from '" << frame << "': the antenna is taken to be in the place of "
+                                                         << frames_.base_link << "; antenna_offset tells otherwise");
+  }
+
+  void publish_map() {
+    if (map_publisher_.getNumSubscribers() == 0 || pipeline_->local_map().map().size() == 0) return;
+    // Stamped with the newest fix: the present time of the system may be another one than the messages'.
+    map_publisher_.publish(to_message(pipeline_->local_map().map().points(), newest_, frames_.odom));
+  }
+
+  bool clear_map(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {
+    pipeline_->clear_map();
+    prior_is_in_ = false;
+    response.success = 1;
+    response.message = "the map is empty";
+    return true;
+  }
+
+  bool save_map(urban_gnss_localization::SaveMap::Request& request,
+                urban_gnss_localization::SaveMap::Response& response) {
+    const PointCloud points = pipeline_->local_map().map().points();
+    response.points = points.size();
+    try {
+      if (points.empty()) throw std::runtime_error("the map is empty");
+      write_pcd(request.file, points);
+      response.success = 1;
+    } catch (const std::exception& error) {
+      response.success = 0;
+      response.message = error.what();
+    }
+    return true;
+  }
+
+  void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
+    using diagnostic_msgs::DiagnosticStatus;
+    const VoxelMap& map = pipeline_->local_map().map();
+    const bool is_complete = fixes_assessed_ > 0 && missing_.empty();
+    status.summary(is_complete ? DiagnosticStatus::OK : DiagnosticStatus::WARN,
+                   fixes_assessed_ == 0 ? "waiting for fixes"
+                                        : (is_complete ? "weighing by " : "without " + missing_ + ", weighing by ") +
+                                              std::string(to_string(source_)));
+    status.add("model", enum_name(pipeline_->parameters().covariance.model));
+    status.add("fixes", fixes_assessed_);
+    status.add("clouds received", clouds_received_);
+    status.add("clouds in the map", clouds_inserted_);
+    status.add("clouds dropped", clouds_dropped_);
+    status.add("alignments accepted", alignments_accepted_);
+    status.add("alignments tried", alignments_tried_);
+    status.add("last alignment", last_alignment_);
+    status.add("voxels", map.size());
+    status.add("map memory (MB)", 1e-6 * static_cast<double>(map.memory_bytes()));
+  }
+
+  Frames frames_;
+  NodeParameters parameters_;
+  std::unique_ptr<OcclusionPipeline> pipeline_;
+  PointCloud prior_;
+  bool prior_is_in_{false};
+  tf2_ros::Buffer tf_buffer_;
+  tf2_ros::TransformListener tf_listener_;
+  StampMonitor fix_stamps_;
+  std::deque<sensor_msgs::PointCloud2ConstPtr> clouds_;
+  std::deque<sensor_msgs::NavSatFix> fixes_;
+  ros::Time newest_;  ///< stamp of the fixes: one of the future is a set-back clock at the next, a cloud's would stay
+  double yaw_sigma_{0.0};
+  bool antenna_known_{false};
+  InputWatch fix_watch_;
+  std::string tf_fault_;
+  std::string missing_;
+  std::string last_alignment_{"none"};
+  VisibilitySource source_{VisibilitySource::kNone};
+  std::size_t fixes_assessed_{0};
+  std::size_t clouds_received_{0};
+  std::size_t clouds_inserted_{0};
+  std::size_t clouds_dropped_{0};
+  std::size_t alignments_tried_{0};
+  std::size_t alignments_accepted_{0};
+  diagnostic_updater::Updater diagnostics_;
+  ros::Publisher fix_publisher_;
+  ros::Publisher visibility_publisher_;
+  ros::Publisher marker_publisher_;
+  ros::Publisher sky_publisher_;
+  ros::Publisher map_publisher_;
+  ros::Subscriber fix_subscriber_;
+  ros::Subscriber satellites_subscriber_;
+  ros::Subscriber cloud_subscriber_;
+  ros::Subscriber estimate_subscriber_;
+  ros::ServiceServer clear_service_;
+  ros::ServiceServer save_service_;
+  ros::WallTimer work_timer_;
+  ros::WallTimer second_timer_;
+  ros::WallTimer map_timer_;
+};
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  return run_node(argc, argv, "occlusion", [](ros::NodeHandle& node, ros::NodeHandle& private_node) {
+    return std::make_shared<OcclusionNode>(node, private_node);
+  });
+}

@@ -1,0 +1,287 @@
+#include "urban_gnss_localization/ros/visibility_messages.hpp"
+
+#include <sensor_msgs/image_encodings.h>
+#include <sensor_msgs/point_cloud2_iterator.h>
+
+#include <algorithm>
+#include <array>
+#include <boost/endian/conversion.hpp>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <stdexcept>
+
+#include "marker_parts.hpp"
+
+namespace urban_gnss {
+namespace {
+
+namespace msgs = urban_gnss_localization;
+using visualization_msgs::Marker;
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr double kFreeRay_m = 40.0;  ///< drawn of a way that is free
+
+struct FloatField {
+  std::uint32_t offset;
+  bool is_double;
+};
+
+FloatField float_field(const sensor_msgs::PointCloud2& message, const char* name) {
+  using Field = sensor_msgs::PointField;
+  for (const Field& field : message.fields) {
+    if (field.name != name) continue;
+    if (field.datatype != Field::FLOAT32 && field.datatype != Field::FLOAT64) {
+      throw std::invalid_argument(std::string("field ") + name + " is no floating point number");
+    }
+    const bool is_double = field.datatype == Field::FLOAT64;
+    if (std::size_t{field.offset} + (is_double ? 8U : 4U) > message.point_step) {
+      throw std::invalid_argument(std::string("field ") + name + " lies outside point_step");
+    }
+    return {field.offset, is_double};
+  }
+  throw std::invalid_argument(std::string("no field ") + name);
+}
+
+float read(const std::uint8_t* point, const FloatField& field) {
+  if (field.is_double) {
+    double value = 0.0;
+    std::memcpy(&value, point + field.offset, sizeof value);
+    return static_cast<float>(value);
+  }
+  float value = 0.0F;
+  std::memcpy(&value, point + field.offset, sizeof value);
+  return value;
+}
+
+boost::array<double, 4> row_major(const Eigen::Matrix2d& matrix) {
+  boost::array<double, 4> values;
+  values[0] = matrix(0, 0);
+  values[1] = matrix(0, 1);
+  values[2] = matrix(1, 0);
+  values[3] = matrix(1, 1);
+  return values;
+}
+
+std::uint8_t visibility_class(const SatelliteAssessment& assessment, const SatelliteObservation& satellite,
+                              bool has_map) {
+  if (!assessment.is_used) return msgs::SatelliteVisibility::NOT_USED;
+  if (!assessment.is_visible) return msgs::SatelliteVisibility::BLOCKED;
+  const bool is_known = !has_map || satellite.known_fraction >= 0.5;
+  return is_known ? msgs::SatelliteVisibility::FREE : msgs::SatelliteVisibility::UNKNOWN;
+}
+
+Colour colour_of(std::uint8_t visibility) {
+  switch (visibility) {
+    case msgs::SatelliteVisibility::FREE: return {0.2F, 0.9F, 0.3F, 0.9F};
+    case msgs::SatelliteVisibility::BLOCKED: return {1.0F, 0.55F, 0.0F, 0.9F};
+    default: return {0.6F, 0.6F, 0.65F, 0.8F};
+  }
+}
+
+}  // namespace
+
+PointCloud to_point_cloud(const sensor_msgs::PointCloud2& message) {
+  const std::size_t count = static_cast<std::size_t>(message.width) * message.height;
+  if (count == 0) return {};
+  if (message.is_bigendian != (boost::endian::order::native == boost::endian::order::big)) {
+    throw std::invalid_argument("the byte order is not this machine's");
+  }
+  const FloatField x = float_field(message, "x");
+  const FloatField y = float_field(message, "y");
+  const FloatField z = float_field(message, "z");
+  if (static_cast<std::size_t>(message.row_step) < static_cast<std::size_t>(message.width) * message.point_step ||
+      message.data.size() < static_cast<std::size_t>(message.row_step) * message.height) {
+    throw std::invalid_argument("less data than width, height and row_step say");
+  }
+  PointCloud cloud;
+  cloud.reserve(count);
+  for (std::uint32_t row = 0; row < message.height; ++row) {
+    const std::uint8_t* point = message.data.data() + static_cast<std::size_t>(row) * message.row_step;
+    for (std::uint32_t i = 0; i < message.width; ++i, point += message.point_step) {
+      cloud.emplace_back(read(point, x), read(point, y), read(point, z));
+    }
+  }
+  return cloud;
+}
+
+sensor_msgs::PointCloud2 to_message(const PointCloud& cloud, const ros::Time& time, const std::string& frame) {
+  sensor_msgs::PointCloud2 message;
+  message.header.stamp = time;
+  message.header.frame_id = frame;
+  sensor_msgs::PointCloud2Modifier modifier(message);
+  modifier.setPointCloud2FieldsByString(1, "xyz");
+  modifier.resize(cloud.size());
+  sensor_msgs::PointCloud2Iterator<float> out(message, "x");
+  for (const Eigen::Vector3f& point : cloud) {
+    out[0] = point.x();
+    out[1] = point.y();
+    out[2] = point.z();
+    ++out;
+  }
+  return message;
+}
+
+std::vector<SatelliteObservation> to_observations(const msgs::SatelliteArray& message) {
+  std::vector<SatelliteObservation> observations;
+  for (const msgs::Satellite& satellite : message.satellites) {
+    SatelliteObservation observation;
+    observation.id = {static_cast<Constellation>(satellite.constellation), satellite.svid};
+    observation.look = {satellite.azimuth, satellite.elevation};
+    observation.cn0_dbhz = satellite.cn0;
+    observation.tracked = satellite.tracked;
+    observations.push_back(observation);
+  }
+  return observations;
+}
+
+std::optional<Eigen::Matrix2d> claimed_covariance(const sensor_msgs::NavSatFix& fix) {
+  if (fix.position_covariance_type == sensor_msgs::NavSatFix::COVARIANCE_TYPE_UNKNOWN) return std::nullopt;
+  const auto& c = fix.position_covariance;
+  Eigen::Matrix2d claimed;
+  claimed << c[0], 0.5 * (c[1] + c[3]), 0.5 * (c[1] + c[3]), c[4];
+  const bool is_usable = claimed.allFinite() && claimed(0, 0) > 0.0 && claimed.determinant() > 0.0;
+  return is_usable ? std::optional<Eigen::Matrix2d>(claimed) : std::nullopt;
+}
+
+sensor_msgs::NavSatFix weighted_fix(const sensor_msgs::NavSatFix& fix, const GnssCovariance& covariance) {
+  sensor_msgs::NavSatFix weighted = fix;
+  const Eigen::Matrix2d& horizontal = covariance.weighted;
+  const auto claimed = claimed_covariance(fix);
+  const double factor = claimed ? std::max(1.0, horizontal.trace() / claimed->trace()) : 1.0;
+  const double up = fix.position_covariance[8];
+  auto& c = weighted.position_covariance;
+  c.fill(0.0);
+  c[0] = horizontal(0, 0);
+  c[1] = c[3] = horizontal(0, 1);
+  c[4] = horizontal(1, 1);
+  c[8] = claimed && std::isfinite(up) && up > 0.0 ? factor * up : 2.0 * horizontal.trace();
+  weighted.position_covariance_type = sensor_msgs::NavSatFix::COVARIANCE_TYPE_KNOWN;
+  return weighted;
+}
+
+msgs::Visibility to_message(const FixAssessment& assessment, const std::optional<Eigen::Matrix2d>& claimed,
+                            const GnssCovarianceParameters& parameters, const ros::Time& time,
+                            const std::string& frame) {
+  const GnssCovariance& covariance = assessment.covariance;
+  msgs::Visibility message;
+  message.header.stamp = time;
+  message.header.frame_id = frame;
+  message.model = enum_name(parameters.model);
+  message.source = static_cast<std::uint8_t>(covariance.source);
+  message.missing = assessment.missing;
+  message.good = covariance.is_good;
+  message.recovering = covariance.is_recovering;
+  message.satellites_used = static_cast<std::uint16_t>(covariance.satellite_count);
+  message.satellites_visible = static_cast<std::uint16_t>(covariance.visible_count);
+  message.hdop_all = static_cast<float>(covariance.hdop_all);
+  message.hdop_visible = static_cast<float>(covariance.hdop_visible);
+  message.claimed_covariance = row_major(claimed.value_or(Eigen::Matrix2d::Zero()));
+  message.conventional_covariance = row_major(covariance.conventional);
+  message.weighted_covariance = row_major(covariance.weighted);
+  for (std::size_t i = 0; i < assessment.satellites.size(); ++i) {
+    const SatelliteObservation& satellite = assessment.satellites[i];
+    const SatelliteAssessment& verdict = covariance.satellites[i];
+    msgs::SatelliteVisibility visibility;
+    visibility.constellation = static_cast<std::uint8_t>(satellite.id.constellation);
+    visibility.svid = static_cast<std::uint16_t>(satellite.id.svid);
+    visibility.name = satellite_name(satellite.id);
+    visibility.azimuth = static_cast<float>(satellite.look.azimuth_rad);
+    visibility.elevation = static_cast<float>(satellite.look.elevation_rad);
+    visibility.cn0 = static_cast<float>(satellite.cn0_dbhz);
+    visibility.blocked_fraction = static_cast<float>(satellite.blocked_fraction);
+    visibility.known_fraction = static_cast<float>(satellite.known_fraction);
+    visibility.nlos_probability = static_cast<float>(verdict.nlos_probability);
+    visibility.range = static_cast<float>(assessment.has_map ? assessment.visibilities[i].range_m : kNaN);
+    visibility.visibility = visibility_class(verdict, satellite, assessment.has_map);
+    message.satellites.push_back(visibility);
+  }
+  return message;
+}
+
+visualization_msgs::MarkerArray ray_markers(const FixAssessment& assessment, const msgs::Visibility& visibility,
+                                            const ros::Time& time, const std::string& frame) {
+  visualization_msgs::MarkerArray markers;
+  Marker clear = make_marker("", 0, Marker::SPHERE, {0.0F, 0.0F, 0.0F, 0.0F}, time, frame);
+  clear.action = Marker::DELETEALL;  // satellites set
+  markers.markers.push_back(clear);
+  if (!assessment.has_map) return markers;
+  const Eigen::AngleAxisd turn(assessment.antenna.east_yaw_rad, Eigen::Vector3d::UnitZ());
+  const Eigen::Vector3d& from = assessment.antenna.position;
+  for (std::size_t i = 0; i < visibility.satellites.size(); ++i) {
+    const msgs::SatelliteVisibility& satellite = visibility.satellites[i];
+    if (satellite.visibility == msgs::SatelliteVisibility::NOT_USED) continue;
+    const int id = static_cast<int>(i);
+    const double length = std::isfinite(satellite.range) ? satellite.range : kFreeRay_m;
+    const Eigen::Vector3d to = from + length * (turn * line_of_sight({satellite.azimuth, satellite.elevation}));
+    Marker ray = make_marker("rays", id, Marker::LINE_STRIP, colour_of(satellite.visibility), time, frame);
+    ray.scale.x = 0.2;
+    ray.points = {point(from.x(), from.y(), from.z()), point(to.x(), to.y(), to.z())};
+    Marker label = make_marker("names", id, Marker::TEXT_VIEW_FACING, {1.0F, 1.0F, 1.0F, 0.9F}, time, frame);
+    label.pose.position = point(to.x(), to.y(), to.z());
+    label.scale.z = 2.0;
+    label.text = satellite.name;
+    markers.markers.push_back(ray);
+    markers.markers.push_back(label);
+  }
+  return markers;
+}
+
+sensor_msgs::Image sky_plot(const msgs::Visibility& visibility, const std::vector<double>& skyline, int size) {
+  sensor_msgs::Image image;
+  image.header = visibility.header;
+  image.encoding = sensor_msgs::image_encodings::RGB8;
+  image.width = image.height = static_cast<std::uint32_t>(size);
+  image.step = 3 * image.width;
+  image.data.assign(static_cast<std::size_t>(image.step) * image.height, 255);
+  const double middle = 0.5 * (size - 1);
+  const double radius = 0.47 * size;  // of the horizon
+  const auto set = [&](int column, int row, const std::array<double, 3>& rgb) {
+    if (column < 0 || row < 0 || column >= size || row >= size) return;
+    const std::size_t at = static_cast<std::size_t>(row) * image.step + 3 * static_cast<std::size_t>(column);
+    for (std::size_t k = 0; k < 3; ++k) image.data[at + k] = static_cast<std::uint8_t>(std::lround(255.0 * rgb[k]));
+  };
+  for (int row = 0; row < size; ++row) {
+    for (int column = 0; column < size; ++column) {
+      const double east = (column - middle) / radius;
+      const double north = (middle - row) / radius;
+      const double from_zenith = std::hypot(east, north);
+      if (from_zenith > 1.0) continue;
+      const double elevation = 0.5 * kPi * (1.0 - from_zenith);
+      bool is_blocked = false;
+      if (!skyline.empty()) {
+        const double turns = std::atan2(east, north) / (2.0 * kPi);
+        const auto steps = static_cast<double>(skyline.size());
+        const auto step = static_cast<std::size_t>(std::lround((turns - std::floor(turns)) * steps)) % skyline.size();
+        is_blocked = elevation <= skyline[step];
+      }
+      // Circles every 30 degrees and the cross of the four directions.
+      const double ring = std::abs(std::remainder(elevation, kPi / 6.0)) * radius / (0.5 * kPi);
+      const bool is_line = ring < 0.5 || std::abs(column - middle) < 0.5 || std::abs(row - middle) < 0.5;
+      set(column, row,
+          is_line      ? std::array<double, 3>{0.75, 0.78, 0.82}
+          : is_blocked ? std::array<double, 3>{0.42, 0.4, 0.38}
+                       : std::array<double, 3>{0.9, 0.95, 1.0});
+    }
+  }
+  for (const msgs::SatelliteVisibility& satellite : visibility.satellites) {
+    if (!std::isfinite(satellite.azimuth) || !(satellite.elevation >= 0.0F)) continue;
+    const double from_zenith = radius * (1.0 - satellite.elevation / (0.5 * kPi));
+    const double column = middle + from_zenith * std::sin(satellite.azimuth);
+    const double row = middle - from_zenith * std::cos(satellite.azimuth);
+    const Colour colour = colour_of(satellite.visibility);
+    const int disc = std::max(2, size / 60);
+    for (int dr = -disc; dr <= disc; ++dr) {
+      for (int dc = -disc; dc <= disc; ++dc) {
+        const int squared = dr * dr + dc * dc;
+        if (squared > disc * disc) continue;
+        const bool is_rim = squared > (disc - 1) * (disc - 1);
+        set(static_cast<int>(std::lround(column)) + dc, static_cast<int>(std::lround(row)) + dr,
+            is_rim ? std::array<double, 3>{0.1, 0.1, 0.1} : std::array<double, 3>{colour.r, colour.g, colour.b});
+      }
+    }
+  }
+  return image;
+}
+
+}  // namespace urban_gnss
