@@ -11,7 +11,7 @@
 #   screenshot_rviz.sh docs/rviz_replay.png /odometry/filtered 'm.header.stamp.to_sec() > 95806' \
 #     replay.launch rate:=6 bag:=/path/to/hk_tst_20210517_ublox.bag
 #   screenshot_rviz.sh docs/rviz_city.png /ground_truth/odom 'm.header.stamp.to_sec() > 1777863640' \
-#     demo.launch scenario:=downtown_grid
+#     demo.launch scenario:=downtown_grid real_time_factor:=0.5
 #
 # Without a graphics card rviz draws a few frames a second: a slow simulation or bag keeps its displays in step.
 set -eo pipefail
