@@ -3,8 +3,6 @@
 
 #include "urban_gnss_localization/experiments/occlusion_experiment.hpp"
 
-#include <ros/package.h>
-
 #include <CLI/CLI.hpp>
 #include <Eigen/LU>
 #include <atomic>
@@ -19,6 +17,7 @@
 #include <sstream>
 #include <thread>
 
+#include "find_scenario.hpp"
 #include "output_file.hpp"
 #include "urban_gnss_localization/common/progress.hpp"
 #include "urban_gnss_localization/evaluation/report_json.hpp"
@@ -44,13 +43,6 @@ struct Options {
   std::string json_file;
   int jobs = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
 };
-
-fs::path find_scenario(const std::string& name) {
-  if (fs::is_regular_file(name)) return name;
-  const fs::path file = fs::path(ros::package::getPath("urban_gnss_localization")) / "scenarios" / (name + ".yaml");
-  if (!fs::is_regular_file(file)) throw std::runtime_error(name + ": neither a file nor a scenario of the package");
-  return file;
-}
 
 template <class... P>
 void read_overrides(const std::string& option, const std::vector<std::string>& overrides, P&... parameters) {

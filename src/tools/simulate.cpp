@@ -1,7 +1,6 @@
 // Drives a scenario offline and writes what the robot's sensors publish into a bag, with the ground truth beside it.
 // The same scenario and seed give the same bag, byte for byte.
 
-#include <ros/package.h>
 #include <rosbag/bag.h>
 #include <sensor_msgs/NavSatFix.h>
 
@@ -14,6 +13,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "find_scenario.hpp"
 #include "output_file.hpp"
 #include "urban_gnss_localization/common/progress.hpp"
 #include "urban_gnss_localization/ros/simulation_messages.hpp"
@@ -46,22 +46,6 @@ struct Run {
   int seed = 0;
   std::optional<tf2_msgs::TFMessage> mounting;
 };
-
-fs::path find_scenario(const std::string& name) {
-  if (fs::is_regular_file(name)) return name;
-  const fs::path package = ros::package::getPath("urban_gnss_localization");
-  std::string known;
-  if (package.empty()) throw std::runtime_error(name + ": no such file");
-  for (const fs::path& candidate :
-       {package / "scenarios" / (name + ".yaml"), package / "config" / name / "simulator.yaml"}) {
-    if (fs::is_regular_file(candidate)) return candidate;
-  }
-  std::vector<std::string> names;
-  for (const auto& entry : fs::directory_iterator(package / "scenarios")) names.push_back(entry.path().stem());
-  std::sort(names.begin(), names.end());
-  for (const std::string& other : names) known += ", " + other;
-  throw std::runtime_error(name + ": neither a file nor one of the scenarios paper_field" + known);
-}
 
 Run make_paper_field(const fs::path& file, const YAML::Node& values, const Options& options) {
   if (!options.overrides.empty())

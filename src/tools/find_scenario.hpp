@@ -1,0 +1,32 @@
+#pragma once
+
+#include <ros/package.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace urban_gnss {
+
+/// The file of a scenario that is given by path or by the name that it has in this package. Throws std::runtime_error
+/// that lists the names where it is neither.
+inline std::filesystem::path find_scenario(const std::string& name) {
+  namespace fs = std::filesystem;
+  if (fs::is_regular_file(name)) return name;
+  const fs::path package = ros::package::getPath("urban_gnss_localization");
+  std::string known;
+  if (package.empty()) throw std::runtime_error(name + ": no such file");
+  for (const fs::path& candidate :
+       {package / "scenarios" / (name + ".yaml"), package / "config" / name / "simulator.yaml"}) {
+    if (fs::is_regular_file(candidate)) return candidate;
+  }
+  std::vector<std::string> names;
+  for (const auto& entry : fs::directory_iterator(package / "scenarios")) names.push_back(entry.path().stem());
+  std::sort(names.begin(), names.end());
+  for (const std::string& other : names) known += ", " + other;
+  throw std::runtime_error(name + ": neither a file nor one of the scenarios paper_field" + known);
+}
+
+}  // namespace urban_gnss
