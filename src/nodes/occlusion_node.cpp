@@ -80,18 +80,27 @@ class OcclusionNode {
 
  private:
   /// Nothing where tf does not know it (yet). Never waits (F24).
-  std::optional<Eigen::Isometry3d> transform(const std::string& to, const std::string& from, const ros::Time& time) {
+  std::optional<geometry_msgs::TransformStamped> look_up(const std::string& to, const std::string& from,
+                                                         const ros::Time& time) {
     try {
-      const auto message = tf_buffer_.lookupTransform(to, from, time).transform;
-      const Eigen::Quaterniond rotation(message.rotation.w, message.rotation.x, message.rotation.y, message.rotation.z);
-      Eigen::Isometry3d isometry = Eigen::Isometry3d::Identity();
-      isometry.translate(Eigen::Vector3d(message.translation.x, message.translation.y, message.translation.z));
-      isometry.rotate(rotation);
-      return isometry;
+      return tf_buffer_.lookupTransform(to, from, time);
     } catch (const tf2::TransformException& error) {
       tf_fault_ = error.what();
       return std::nullopt;
     }
+  }
+
+  static Eigen::Isometry3d to_isometry(const geometry_msgs::Transform& transform) {
+    const auto& r = transform.rotation;
+    Eigen::Isometry3d isometry = Eigen::Isometry3d::Identity();
+    isometry.translate(Eigen::Vector3d(transform.translation.x, transform.translation.y, transform.translation.z));
+    isometry.rotate(Eigen::Quaterniond(r.w, r.x, r.y, r.z));
+    return isometry;
+  }
+
+  std::optional<Eigen::Isometry3d> transform(const std::string& to, const std::string& from, const ros::Time& time) {
+    const auto found = look_up(to, from, time);
+    return found ? std::optional<Eigen::Isometry3d>(to_isometry(found->transform)) : std::nullopt;
   }
 
   void on_cloud(const sensor_msgs::PointCloud2ConstPtr& message) {
@@ -155,20 +164,15 @@ class OcclusionNode {
   }
 
   void update_alignment() {
-    const auto odom_in_map = transform(frames_.map, frames_.odom, ros::Time(0));
-    if (!odom_in_map) return;
+    const auto found = look_up(frames_.map, frames_.odom, ros::Time(0));
+    if (!found) return;
+    const Eigen::Isometry3d odom_in_map = to_isometry(found->transform);
     WorldAlignment alignment;
-    const Eigen::Vector3d x = odom_in_map->linear().col(0);
-    alignment.odom_in_world = {odom_in_map->translation().x(), odom_in_map->translation().y(),
-                               std::atan2(x.y(), x.x())};
+    const Eigen::Vector3d x = odom_in_map.linear().col(0);
+    alignment.odom_in_world = {odom_in_map.translation().x(), odom_in_map.translation().y(), std::atan2(x.y(), x.x())};
     alignment.yaw_sigma_rad = yaw_sigma_;
-    alignment.stamp = to_stamp(newest_);
-    try {
-      const auto stamp = tf_buffer_.lookupTransform(frames_.map, frames_.odom, ros::Time(0)).header.stamp;
-      if (!stamp.isZero()) alignment.stamp = to_stamp(stamp);  // a static transform has none: it always holds
-    } catch (const tf2::TransformException&) {
-      return;
-    }
+    // A static transform has no stamp: it always holds.
+    alignment.stamp = to_stamp(found->header.stamp.isZero() ? newest_ : found->header.stamp);
     pipeline_->set_alignment(alignment);
     if (!prior_.empty() && !prior_is_in_) {
       prior_is_in_ = true;
