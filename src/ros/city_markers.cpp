@@ -15,8 +15,6 @@ using visualization_msgs::MarkerArray;
 
 constexpr double kRayLength_m = 60.0;  ///< drawn of the way to a satellite
 
-geometry_msgs::Point point(const Eigen::Vector3d& p) { return urban_gnss::point(p.x(), p.y(), p.z()); }
-
 std_msgs::ColorRGBA to_message(const Colour& colour) {
   std_msgs::ColorRGBA message;
   message.r = colour.r;
@@ -60,8 +58,8 @@ void add_walls(const Building& building, Triangles& triangles) {
     const Eigen::Vector2d& a = corners[i];
     const Eigen::Vector2d& b = corners[(i + 1) % corners.size()];
     const Eigen::Vector2d side = (b - a).normalized();
-    triangles.add_quad(point({a.x(), a.y(), building.base_m}), point({b.x(), b.y(), building.base_m}),
-                       point({b.x(), b.y(), building.roof_m}), point({a.x(), a.y(), building.roof_m}),
+    triangles.add_quad(point(a.x(), a.y(), building.base_m), point(b.x(), b.y(), building.base_m),
+                       point(b.x(), b.y(), building.roof_m), point(a.x(), a.y(), building.roof_m),
                        wall_colour({side.y(), -side.x()}));
   }
 }
@@ -82,7 +80,7 @@ void add_face(const Building& building, double height_m, const Colour& colour, T
   set.get_trapezoids(trapezoids);
   for (const auto& trapezoid : trapezoids) {
     std::vector<geometry_msgs::Point> outline;
-    for (const auto& corner : trapezoid) outline.push_back(point({0.001 * corner.x(), 0.001 * corner.y(), height_m}));
+    for (const auto& corner : trapezoid) outline.push_back(point(0.001 * corner.x(), 0.001 * corner.y(), height_m));
     for (std::size_t i = 2; i < outline.size(); ++i) triangles.add(outline[0], outline[i - 1], outline[i], colour);
   }
 }
@@ -93,8 +91,8 @@ void add_outline(const Building& building, Marker& edges) {
   for (std::size_t i = 0; i < corners.size(); ++i) {
     const Eigen::Vector2d& a = corners[i];
     const Eigen::Vector2d& b = corners[(i + 1) % corners.size()];
-    const auto top = point({a.x(), a.y(), building.roof_m});
-    for (const auto& end : {top, point({b.x(), b.y(), building.roof_m}), top, point({a.x(), a.y(), building.base_m})}) {
+    const auto top = point(a.x(), a.y(), building.roof_m);
+    for (const auto& end : {top, point(b.x(), b.y(), building.roof_m), top, point(a.x(), a.y(), building.base_m)}) {
       edges.points.push_back(end);
     }
   }
@@ -108,7 +106,7 @@ Marker ground(const World& world, const Route& route, const ros::Time& time, con
   }
   constexpr double kMargin_m = 50.0;
   Marker marker = make_marker("ground", 0, Marker::CUBE, {0.28F, 0.29F, 0.30F, 1.0F}, time, map_frame);
-  marker.pose.position = point({bounds.center().x(), bounds.center().y(), -0.1});
+  marker.pose.position = point(bounds.center().x(), bounds.center().y(), -0.1);
   set_scale(marker, bounds.sizes().x() + 2.0 * kMargin_m, bounds.sizes().y() + 2.0 * kMargin_m, 0.1);
   return marker;
 }
@@ -118,7 +116,7 @@ void add_trees(const World& world, const ros::Time& time, const std::string& map
     const Tree& tree = world.trees[i];
     const auto cylinder = [&](const char* ns, double radius, double base, double top, const Colour& colour) {
       Marker marker = make_marker(ns, static_cast<int>(i), Marker::CYLINDER, colour, time, map_frame);
-      marker.pose.position = point({tree.position.x(), tree.position.y(), 0.5 * (base + top)});
+      marker.pose.position = point(tree.position.x(), tree.position.y(), 0.5 * (base + top));
       set_scale(marker, 2.0 * radius, 2.0 * radius, top - base);
       markers.markers.push_back(marker);
     };
@@ -160,7 +158,7 @@ MarkerArray world_markers(const World& world, const Route& route, const ros::Tim
   Marker line = make_marker("route", 0, Marker::LINE_STRIP, {0.75F, 0.75F, 0.8F, 0.7F}, time, map_frame);
   line.scale.x = 0.3;
   for (const RouteWaypoint& waypoint : route.waypoints) {
-    line.points.push_back(point({waypoint.position.x(), waypoint.position.y(), 0.05}));
+    line.points.push_back(point(waypoint.position.x(), waypoint.position.y(), 0.05));
   }
   if (route.loop) line.points.push_back(line.points.front());
   markers.markers.push_back(line);
@@ -227,7 +225,7 @@ MarkerArray fix_markers(const ReceiverFix& fix, const Eigen::Vector3d& error, co
   set_scale(ball, 2.0, 2.0, 2.0);
   Marker line = make_marker("fix_error", 0, Marker::LINE_STRIP, {1.0F, 0.95F, 0.1F, 0.9F}, time, map_frame);
   line.scale.x = 0.3;
-  line.points = {point(place), point({place.x() - error.x(), place.y() - error.y(), kHeight_m})};
+  line.points = {point(place), point(place.x() - error.x(), place.y() - error.y(), kHeight_m)};
   MarkerArray markers;
   markers.markers = {disc, ball, line};
   return markers;

@@ -4,6 +4,7 @@
 #include <ros/time.h>
 #include <visualization_msgs/Marker.h>
 
+#include <Eigen/Core>
 #include <string>
 
 namespace urban_gnss {
@@ -36,6 +37,8 @@ inline geometry_msgs::Point point(double x, double y, double z) {
   p.z = z;
   return p;
 }
+
+inline geometry_msgs::Point point(const Eigen::Vector3d& p) { return point(p.x(), p.y(), p.z()); }
 
 inline void set_scale(visualization_msgs::Marker& marker, double x, double y, double z) {
   marker.scale.x = x;

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "marker_parts.hpp"
+
 namespace urban_gnss {
 namespace {
 
@@ -21,14 +23,6 @@ nav_msgs::Odometry odometry(const Pose2& pose, const Twist2& twist, const ros::T
   message.pose.pose = to_message(pose);
   message.twist.twist.linear.x = twist.speed_mps;
   message.twist.twist.angular.z = twist.yaw_rate_radps;
-  return message;
-}
-
-geometry_msgs::Point to_point(const Eigen::Vector3d& point) {
-  geometry_msgs::Point message;
-  message.x = point.x();
-  message.y = point.y();
-  message.z = point.z();
   return message;
 }
 
@@ -156,7 +150,7 @@ msgs::SignalPathArray to_message(const SignalsEvent& event, const ros::Time& tim
     path.cn0 = static_cast<float>(truth.report.cn0_dbhz);
     path.excess_path = static_cast<float>(truth.report.excess_m);
     path.pseudorange_error = static_cast<float>(truth.report.range_error_m);
-    for (const Eigen::Vector3d& point : truth.path) path.path.push_back(to_point(point));
+    for (const Eigen::Vector3d& corner : truth.path) path.path.push_back(point(corner));
     message.paths.push_back(path);
   }
   return message;

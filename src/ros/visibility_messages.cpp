@@ -216,9 +216,9 @@ visualization_msgs::MarkerArray ray_markers(const FixAssessment& assessment, con
     const Eigen::Vector3d to = from + length * (turn * line_of_sight({satellite.azimuth, satellite.elevation}));
     Marker ray = make_marker("rays", id, Marker::LINE_STRIP, colour_of(satellite.visibility), time, frame);
     ray.scale.x = 0.2;
-    ray.points = {point(from.x(), from.y(), from.z()), point(to.x(), to.y(), to.z())};
+    ray.points = {point(from), point(to)};
     Marker label = make_marker("names", id, Marker::TEXT_VIEW_FACING, {1.0F, 1.0F, 1.0F, 0.9F}, time, frame);
-    label.pose.position = point(to.x(), to.y(), to.z());
+    label.pose.position = point(to);
     label.scale.z = 2.0;
     label.text = satellite.name;
     markers.markers.push_back(ray);
