@@ -65,7 +65,9 @@ PointCloud LocalMap::cut(const PointCloud& scan, const Eigen::Isometry3d& sensor
       continue;
     }
     const Eigen::Vector3f in_base = to_base * point;
-    if (in_base.z() < min_height_m || in_base.head<2>().norm() < body_m || point.norm() > max_range_m) {
+    const bool is_own_body = in_base.head<2>().norm() < body_m;
+    if (is_own_body) ++report.own_body;
+    if (is_own_body || in_base.z() < min_height_m || point.norm() > max_range_m) {
       ++report.cut;
       continue;
     }

@@ -23,6 +23,8 @@ bool has_direction(const SatelliteObservation& satellite) {
          satellite.look.elevation_rad <= 0.5 * kPi + 1e-6;
 }
 
+constexpr std::size_t kMaxEpochs = 20;
+
 void append(std::string& text, const std::string& more) { text += (text.empty() ? "" : ", ") + more; }
 
 }  // namespace
@@ -76,7 +78,9 @@ CloudOutcome OcclusionPipeline::add_cloud(Stamp stamp, const PointCloud& cloud, 
   }
   outcome.scan = local_map_.add_scan(cloud, sensor_in_base, base_in_odom);
   kd_tracer_.reset();
-  if (outcome.scan.insertion.points == outcome.scan.insertion.unusable) {
+  const ScanReport& scan = outcome.scan;
+  const bool has_ground = scan.points > scan.not_finite + scan.own_body;
+  if (scan.insertion.points == scan.insertion.unusable && !has_ground) {
     outcome.decision = CloudDecision::kEmpty;  // nothing was seen, so the map is no younger for it
     return outcome;
   }
@@ -95,15 +99,32 @@ void OcclusionPipeline::set_antenna(const Eigen::Vector3d& place) {
 }
 
 void OcclusionPipeline::set_alignment(const WorldAlignment& alignment) {
-  if (!is_finite(alignment.odom_in_world) || !std::isfinite(alignment.yaw_sigma_rad)) return;
-  alignment_ = alignment;
+  if (!is_finite(alignment.odom_in_world)) return;
+  const bool is_known = std::isfinite(alignment.yaw_sigma_rad) && alignment.yaw_sigma_rad >= 0.0;
+  alignment_ = is_known ? std::optional<WorldAlignment>(alignment) : std::nullopt;
 }
 
 void OcclusionPipeline::set_satellites(Stamp stamp, std::vector<SatelliteObservation> satellites,
                                        double angle_resolution_rad) {
-  satellites_stamp_ = stamp;
-  satellites_ = std::move(satellites);
-  angle_resolution_rad_ = std::isfinite(angle_resolution_rad) ? std::max(0.0, angle_resolution_rad) : 0.0;
+  const double resolution_rad = std::isfinite(angle_resolution_rad) ? std::max(0.0, angle_resolution_rad) : 0.0;
+  epochs_.push_back({stamp, std::move(satellites), resolution_rad});
+  if (epochs_.size() > kMaxEpochs) epochs_.pop_front();
+  if (last_fix_ == stamp) are_paired_ = true;  // they came late
+}
+
+bool OcclusionPipeline::awaits_satellites(Stamp fix_stamp) const {
+  return are_paired_ && std::none_of(epochs_.begin(), epochs_.end(),
+                                     [&](const SatelliteEpoch& epoch) { return epoch.stamp == fix_stamp; });
+}
+
+const OcclusionPipeline::SatelliteEpoch* OcclusionPipeline::satellites_at(Stamp stamp) const {
+  const auto distance = [&](const SatelliteEpoch& epoch) { return std::abs(to_seconds(stamp - epoch.stamp)); };
+  // From the back: of two that are as near, the one that came last.
+  const auto nearest = std::min_element(epochs_.rbegin(), epochs_.rend(),
+                                        [&](const auto& a, const auto& b) { return distance(a) < distance(b); });
+  const bool is_there = nearest != epochs_.rend() && !nearest->satellites.empty() &&
+                        distance(*nearest) <= parameters_.occlusion.satellites_timeout;
+  return is_there ? &*nearest : nullptr;
 }
 
 const RayTracer& OcclusionPipeline::tracer() const {
@@ -161,11 +182,12 @@ FixAssessment OcclusionPipeline::assess(Stamp stamp, const std::optional<Eigen::
                                         const std::optional<Eigen::Isometry3d>& base_in_odom) {
   FixAssessment assessment;
   assessment.stamp = stamp;
-  const bool has_satellites = !satellites_.empty() && std::abs(to_seconds(stamp - satellites_stamp_)) <=
-                                                          parameters_.occlusion.satellites_timeout;
-  if (has_satellites) assessment.satellites = satellites_;
+  const SatelliteEpoch* epoch = satellites_at(stamp);
+  last_fix_ = stamp;
+  are_paired_ = epoch != nullptr && epoch->stamp == stamp;
+  if (epoch != nullptr) assessment.satellites = epoch->satellites;
   const auto antenna = antenna_at(stamp, base_in_odom, assessment.missing);
-  if (!has_satellites) append(assessment.missing, "satellites");
+  if (epoch == nullptr) append(assessment.missing, "satellites");
   assessment.visibilities.resize(assessment.satellites.size());
   std::optional<SkyObservation> sky;
   if (antenna) {
@@ -174,12 +196,13 @@ FixAssessment OcclusionPipeline::assess(Stamp stamp, const std::optional<Eigen::
     for (std::size_t i = 0; i < assessment.satellites.size(); ++i) {
       SatelliteObservation& satellite = assessment.satellites[i];
       if (!has_direction(satellite)) continue;
-      assessment.visibilities[i] = assess_visibility(tracer(), local_map_.map().observed_space(), *antenna,
-                                                     satellite.look, angle_resolution_rad_, parameters_.visibility);
+      assessment.visibilities[i] =
+          assess_visibility(tracer(), local_map_.map().observed_space(), *antenna, satellite.look,
+                            epoch->angle_resolution_rad, parameters_.visibility);
       satellite.blocked_fraction = assessment.visibilities[i].blocked_fraction;
       satellite.known_fraction = assessment.visibilities[i].known_fraction;
     }
-    if (!has_satellites) sky = observe_sky(*antenna);
+    if (epoch == nullptr) sky = observe_sky(*antenna);
   }
   assessment.covariance = covariance_.process(assessment.satellites, sky, claimed);
   return assessment;
@@ -196,7 +219,9 @@ void OcclusionPipeline::reset() {
   clear_map();
   covariance_.reset();
   alignment_.reset();
-  satellites_.clear();
+  epochs_.clear();
+  last_fix_.reset();
+  are_paired_ = false;
 }
 
 }  // namespace urban_gnss

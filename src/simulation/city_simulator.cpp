@@ -114,17 +114,18 @@ void CitySimulator::receive(double interval_s) {
   // A serial line keeps the order also where the latency varies by more than the time between two epochs.
   const Stamp published = std::max(now_ + from_seconds(epoch.latency_s), last_published_);
   last_published_ = published;
+  SignalsEvent signals;
+  for (std::size_t i = 0; i < received_.size(); ++i) {
+    signals.signals.push_back(signal_truth(epoch.satellites[i], received_[i], antenna));
+  }
+  // Before the fix, so that who weighs it has them.
+  add(published, {now_, published, SatellitesEvent{std::move(epoch.satellites), scenario_.receiver.angle_resolution}});
   for (const PublishedFix& fix : published_) {
     add(published, {now_, published, FixEvent{fix, epoch.used_count}});
     if (fix.publisher == 0 && fix.has_fix && fix.fix.position.allFinite()) {
       add(published, {now_, published, FixTruthEvent{fix.fix.position - antenna, std::nullopt}});
     }
   }
-  SignalsEvent signals;
-  for (std::size_t i = 0; i < received_.size(); ++i) {
-    signals.signals.push_back(signal_truth(epoch.satellites[i], received_[i], antenna));
-  }
-  add(published, {now_, published, SatellitesEvent{std::move(epoch.satellites), scenario_.receiver.angle_resolution}});
   add(published, {now_, published, std::move(signals)});
 }
 

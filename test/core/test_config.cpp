@@ -133,7 +133,7 @@ Values frames() { return declared_in("include/urban_gnss_localization/ros/conver
 Values shell() { return merged(frames(), declared_in("include/urban_gnss_localization/ros/localizer_node.hpp")); }
 Values filter_node() { return merged(shell(), declared_in("src/nodes/particle_filter_node.cpp")); }
 Values controller_node() { return declared_in("src/nodes/waypoint_controller_node.cpp"); }
-Values occlusion_node() { return merged(frames(), declared_in("src/nodes/occlusion_node.cpp")); }
+Values occlusion_node() { return merged(frames(), declared_in("include/urban_gnss_localization/ros/occlusion_node.hpp")); }
 Values simulator_node() {
   return merged(merged(frames(), declared_in("include/urban_gnss_localization/ros/simulation_messages.hpp")),
                 declared_in("src/nodes/simulator_node.cpp"));

@@ -38,7 +38,8 @@ struct LocalMapParameters {
 struct ScanReport {
   std::size_t points{0};
   std::size_t not_finite{0};
-  std::size_t cut{0};  ///< robot, ground and beyond the range
+  std::size_t own_body{0};  ///< the robot itself
+  std::size_t cut{0};       ///< robot, ground and beyond the range
   bool is_keyframe{false};
   Alignment alignment;  ///< kNotTried between keyframes, and where the map is still empty
   InsertReport insertion;

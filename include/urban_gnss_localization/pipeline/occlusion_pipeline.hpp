@@ -2,7 +2,6 @@
 
 #include <Eigen/Geometry>
 #include <deque>
-#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -77,8 +76,8 @@ struct OcclusionPipelineParameters {
 /// How the odometry frame lies in the world, from a localizer or a compass.
 struct WorldAlignment {
   Stamp stamp{0};
-  Pose2 odom_in_world;  ///< map -> odom; of it the yaw is used, and the place where there is a prior map
-  double yaw_sigma_rad{0.0};
+  Pose2 odom_in_world;        ///< map -> odom; of it the yaw is used, and the place where there is a prior map
+  double yaw_sigma_rad{0.0};  ///< not finite or negative: the heading is not known
 };
 
 /// Why a cloud did not go into the map.
@@ -111,17 +110,22 @@ class OcclusionPipeline {
   OcclusionPipeline& operator=(const OcclusionPipeline&) = delete;
 
   /// A cloud in the sensor's frame (m), with the robot's pose in the odometry frame at the cloud's own stamp. One that
-  /// is older than the last by more than map_timeout is taken: the last one's stamp was wrong.
+  /// is older than the last by more than map_timeout is taken: the last one's stamp was wrong. One of nothing but
+  /// ground says that nothing stands about.
   CloudOutcome add_cloud(Stamp stamp, const PointCloud& cloud, const Eigen::Isometry3d& sensor_in_base,
                          const Eigen::Isometry3d& base_in_odom);
   /// A map that was there before, in the world's axes; turned into the odometry frame by `odom_in_world`.
   InsertReport add_prior(const PointCloud& points, const Pose2& odom_in_world);
   /// The antenna's place in base_link, m, over antenna_offset.
   void set_antenna(const Eigen::Vector3d& place);
-  /// Ignored where it is not finite.
+  /// Ignored where its pose is not finite.
   void set_alignment(const WorldAlignment& alignment);
   /// Angles that are not finite are left out. `angle_resolution_rad`: step that the receiver rounds to; 0 if unknown.
+  /// The latest ones are kept: a fix is weighed by those that are nearest to it in time.
   void set_satellites(Stamp stamp, std::vector<SatelliteObservation> satellites, double angle_resolution_rad);
+  /// Whether the satellites of a fix with this stamp are still to come, by what came to the fix before it: satellites
+  /// of the fix's own stamp.
+  bool awaits_satellites(Stamp fix_stamp) const;
 
   /// A fix with the covariance that its receiver claims (m^2, east and north), and the robot's pose in the odometry
   /// frame at its stamp, where that is known.
@@ -142,6 +146,13 @@ class OcclusionPipeline {
   std::optional<AntennaPose> antenna_at(Stamp stamp, const std::optional<Eigen::Isometry3d>& base_in_odom,
                                         std::string& missing) const;
   SkyObservation observe_sky(const AntennaPose& antenna) const;
+  struct SatelliteEpoch {
+    Stamp stamp{0};
+    std::vector<SatelliteObservation> satellites;
+    double angle_resolution_rad{0.0};
+  };
+  /// Nothing where they are too old.
+  const SatelliteEpoch* satellites_at(Stamp stamp) const;
 
   OcclusionPipelineParameters parameters_;
   LocalMap local_map_;
@@ -152,9 +163,9 @@ class OcclusionPipeline {
   std::optional<Stamp> last_cloud_;
   std::optional<WorldAlignment> alignment_;
   bool has_prior_{false};
-  Stamp satellites_stamp_{0};
-  std::vector<SatelliteObservation> satellites_;
-  double angle_resolution_rad_{0.0};
+  std::deque<SatelliteEpoch> epochs_;  ///< the latest, as they came
+  std::optional<Stamp> last_fix_;
+  bool are_paired_{false};  ///< the last fix had satellites of its own stamp
 };
 
 }  // namespace urban_gnss
