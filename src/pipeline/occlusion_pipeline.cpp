@@ -55,6 +55,7 @@ void OcclusionPipelineParameters::check(std::vector<std::string>& faults) const 
   aligner.check(faults);
   voxel_tracer.check(faults);
   covariance.check(faults);
+  consistency.check(faults);
 }
 
 OcclusionPipeline::OcclusionPipeline(const OcclusionPipelineParameters& parameters)
@@ -62,6 +63,7 @@ OcclusionPipeline::OcclusionPipeline(const OcclusionPipelineParameters& paramete
       local_map_(parameters.local_map, parameters.voxels, parameters.aligner),
       voxel_tracer_(local_map_.map(), parameters.voxel_tracer),
       covariance_(parameters.covariance),
+      consistency_(parameters.consistency),
       antenna_in_base_(parameters.occlusion.antenna_offset[0], parameters.occlusion.antenna_offset[1],
                        parameters.occlusion.antenna_offset[2]) {}
 
@@ -202,6 +204,11 @@ FixAssessment OcclusionPipeline::assess(Stamp stamp, const std::optional<Eigen::
       satellite.blocked_fraction = assessment.visibilities[i].blocked_fraction;
       satellite.known_fraction = assessment.visibilities[i].known_fraction;
     }
+    consistency_.add(stamp, assessment.satellites);
+    assessment.strong_share = consistency_.strong_share();
+    if (consistency_.is_doubtful()) {
+      assessment.doubt = "satellites that the map blocks are received strongly: the heading or the map is wrong";
+    }
     if (epoch == nullptr) sky = observe_sky(*antenna);
   }
   assessment.covariance = covariance_.process(assessment.satellites, sky, claimed);
@@ -210,6 +217,7 @@ FixAssessment OcclusionPipeline::assess(Stamp stamp, const std::optional<Eigen::
 
 void OcclusionPipeline::clear_map() {
   local_map_.clear();
+  consistency_.reset();
   kd_tracer_.reset();
   last_cloud_.reset();
   has_prior_ = false;

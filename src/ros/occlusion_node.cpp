@@ -219,12 +219,14 @@ bool OcclusionNode::assess(const sensor_msgs::NavSatFixConstPtr& pointer) {
   if (!antenna_known_) place_antenna(message);
   const FixAssessment assessment = pipeline_->assess(to_stamp(stamp), claimed_covariance(message), base);
   missing_ = assessment.missing;
+  doubt_ = assessment.doubt;
   source_ = assessment.covariance.source;
   ++fixes_assessed_;
   if (!assessment.missing.empty()) {
     ROS_WARN_STREAM_THROTTLE(
         10.0, "without " << assessment.missing << ": weighed by " << to_string(assessment.covariance.source));
   }
+  if (!doubt_.empty()) ROS_WARN_STREAM_THROTTLE(10.0, doubt_);
   publish(message, assessment);
   return true;
 }
@@ -294,11 +296,14 @@ bool OcclusionNode::save_map(urban_gnss_localization::SaveMap::Request& request,
 void OcclusionNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
   using diagnostic_msgs::DiagnosticStatus;
   const VoxelMap& map = pipeline_->local_map().map();
-  const bool is_complete = fixes_assessed_ > 0 && missing_.empty();
-  status.summary(is_complete ? DiagnosticStatus::OK : DiagnosticStatus::WARN,
-                 fixes_assessed_ == 0 ? "waiting for fixes"
-                                      : (is_complete ? "weighing by " : "without " + missing_ + ", weighing by ") +
-                                            std::string(to_string(source_)));
+  std::string summary = "waiting for fixes";
+  if (fixes_assessed_ > 0) {
+    summary = doubt_.empty() ? "" : doubt_ + "; ";
+    if (!missing_.empty()) summary += "without " + missing_ + ", ";
+    summary += std::string("weighing by ") + to_string(source_);
+  }
+  const bool is_well = fixes_assessed_ > 0 && missing_.empty() && doubt_.empty();
+  status.summary(is_well ? DiagnosticStatus::OK : DiagnosticStatus::WARN, summary);
   status.add("model", enum_name(pipeline_->parameters().covariance.model));
   status.add("fixes", fixes_assessed_);
   status.add("clouds received", clouds_received_);
@@ -307,6 +312,7 @@ void OcclusionNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status
   status.add("alignments accepted", alignments_accepted_);
   status.add("alignments tried", alignments_tried_);
   status.add("last alignment", last_alignment_);
+  status.add("tf", tf_fault_.empty() ? "no fault" : tf_fault_);
   status.add("voxels", map.size());
   status.add("map memory (MB)", 1e-6 * static_cast<double>(map.memory_bytes()));
 }

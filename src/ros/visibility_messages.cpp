@@ -170,6 +170,8 @@ msgs::Visibility to_message(const FixAssessment& assessment, const std::optional
   message.model = enum_name(parameters.model);
   message.source = static_cast<std::uint8_t>(covariance.source);
   message.missing = assessment.missing;
+  message.doubt = assessment.doubt;
+  message.strong_share = static_cast<float>(assessment.strong_share);
   message.good = covariance.is_good;
   message.recovering = covariance.is_recovering;
   message.satellites_used = static_cast<std::uint16_t>(covariance.satellite_count);

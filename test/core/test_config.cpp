@@ -133,7 +133,9 @@ Values frames() { return declared_in("include/urban_gnss_localization/ros/conver
 Values shell() { return merged(frames(), declared_in("include/urban_gnss_localization/ros/localizer_node.hpp")); }
 Values filter_node() { return merged(shell(), declared_in("src/nodes/particle_filter_node.cpp")); }
 Values controller_node() { return declared_in("src/nodes/waypoint_controller_node.cpp"); }
-Values occlusion_node() { return merged(frames(), declared_in("include/urban_gnss_localization/ros/occlusion_node.hpp")); }
+Values occlusion_node() {
+  return merged(frames(), declared_in("include/urban_gnss_localization/ros/occlusion_node.hpp"));
+}
 Values simulator_node() {
   return merged(merged(frames(), declared_in("include/urban_gnss_localization/ros/simulation_messages.hpp")),
                 declared_in("src/nodes/simulator_node.cpp"));
@@ -177,7 +179,7 @@ TEST(Config, OcclusionStatesEveryDefault) {
   Values defaults = occlusion_node();
   for (const Values& group :
        {defaults_of(p.occlusion), defaults_of(p.visibility), defaults_of(p.local_map), defaults_of(p.voxels),
-        defaults_of(p.aligner), defaults_of(p.voxel_tracer), defaults_of(p.covariance)}) {
+        defaults_of(p.aligner), defaults_of(p.voxel_tracer), defaults_of(p.covariance), defaults_of(p.consistency)}) {
     defaults = merged(defaults, group);
   }
   expect_states(file, defaults);

@@ -95,9 +95,10 @@ class Street:
                     raise AssertionError("waited %.0f s for %s" % (self.TIMEOUT_S, what))
                 self.news.wait(0.05)
 
-    def feed(self, epochs, cloud=None, satellites=True, tf=True, sky=None):
+    def feed(self, epochs, cloud=None, satellites=True, tf=True, lag=1):
         """Publishes `epochs` epochs with these points of a cloud (None: no cloud) and waits until each node has
-        answered all but the last, which may wait for the next. Returns the stamps (ns) of those that were answered."""
+        answered all but the last `lag`, which may wait for what comes after them. Returns the stamps (ns) of those that
+        were answered."""
         stamps = []
         for _ in range(epochs):
             self.time_s += PERIOD_S
@@ -107,19 +108,19 @@ class Street:
             if cloud is not None:
                 self.publishers["points"].publish(to_cloud(stamp, cloud))
             if satellites:
-                self.publishers["gps/satellites"].publish(self._satellites(stamp, sky or SKY))
+                self.publishers["gps/satellites"].publish(self._satellites(stamp))
             self.publishers["gps/fix"].publish(self._fix(stamp))
-            if stamps:
-                self.await_(lambda: all(stamps[-1] in store for stores in (self.weighted, self.visibilities)
-                                        for store in stores.values()), "the fix at %d" % stamps[-1])
             stamps.append(stamp.to_nsec())
-        return stamps[:-1]
+            for due in stamps[:-lag][-1:]:
+                self.await_(lambda: all(due in store for stores in (self.weighted, self.visibilities)
+                                        for store in stores.values()), "the fix at %d" % due)
+        return stamps[:-lag]
 
     @staticmethod
-    def _satellites(stamp, sky):
+    def _satellites(stamp):
         message = SatelliteArray()
         message.header.stamp, message.header.frame_id = stamp, "gps"
-        for svid, (azimuth, elevation, cn0) in sky.items():
+        for svid, (azimuth, elevation, cn0) in SKY.items():
             message.satellites.append(Satellite(svid=svid, name="G%02d" % svid, azimuth=math.radians(azimuth),
                                                 elevation=math.radians(elevation), cn0=cn0, tracked=True,
                                                 used=Satellite.USED, pseudorange_residual=float("nan")))

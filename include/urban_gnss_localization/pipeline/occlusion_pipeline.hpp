@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <deque>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -14,7 +15,7 @@
 #include "urban_gnss_localization/occlusion/local_map.hpp"
 #include "urban_gnss_localization/occlusion/visibility.hpp"
 #include "urban_gnss_localization/occlusion/voxel_ray_tracer.hpp"
-#include "urban_gnss_localization/pipeline/stamp_monitor.hpp"
+#include "urban_gnss_localization/pipeline/map_consistency.hpp"
 
 namespace urban_gnss {
 
@@ -59,6 +60,7 @@ struct OcclusionPipelineParameters {
   ScanAlignerParameters aligner;
   VoxelRayTracerParameters voxel_tracer;
   GnssCovarianceParameters covariance;
+  MapConsistencyParameters consistency;
 
   template <class V>
   void visit(V& v) {
@@ -69,6 +71,7 @@ struct OcclusionPipelineParameters {
     aligner.visit(v);
     voxel_tracer.visit(v);
     covariance.visit(v);
+    consistency.visit(v);
   }
   void check(std::vector<std::string>& faults) const;
 };
@@ -98,6 +101,8 @@ struct FixAssessment {
   AntennaPose antenna;                            ///< in the map of the surroundings
   bool has_map{false};                            ///< map, heading and odometry were there for this fix
   std::string missing;                            ///< what was not, for the user; empty where all was
+  double strong_share{std::numeric_limits<double>::quiet_NaN()};  ///< MapConsistency::strong_share()
+  std::string doubt;  ///< what does not fit together, for the user; empty where all does
 };
 
 /// Clouds, satellites and fixes in, honest covariances out (Maier & Kleiner 2010): the map is built in the odometry
@@ -159,6 +164,7 @@ class OcclusionPipeline {
   VoxelRayTracer voxel_tracer_;
   mutable std::unique_ptr<KdTreeRayTracer> kd_tracer_;  ///< of the map as it is; made when asked for
   GnssCovarianceModel covariance_;
+  MapConsistency consistency_;
   Eigen::Vector3d antenna_in_base_;
   std::optional<Stamp> last_cloud_;
   std::optional<WorldAlignment> alignment_;

@@ -14,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include "urban_gnss_localization/pipeline/stamp_monitor.hpp"
 #include "urban_gnss_localization/ros/conversions.hpp"
 #include "urban_gnss_localization/ros/input_watch.hpp"
 #include "urban_gnss_localization/ros/visibility_messages.hpp"
@@ -98,6 +99,7 @@ class OcclusionNode {
   InputWatch fix_watch_;
   std::string tf_fault_;
   std::string missing_;
+  std::string doubt_;
   std::string last_alignment_{"none"};
   VisibilitySource source_{VisibilitySource::kNone};
   std::size_t fixes_assessed_{0};

@@ -1,0 +1,55 @@
+#pragma once
+
+#include <limits>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "urban_gnss_localization/common/parameters.hpp"
+#include "urban_gnss_localization/common/stamp.hpp"
+#include "urban_gnss_localization/gnss/gnss_covariance.hpp"
+
+namespace urban_gnss {
+
+struct MapConsistencyParameters {
+  double strong_cn0{40.0};        ///< dB-Hz, a signal as strong as that has a line of sight
+  double consistency_time{60.0};  ///< s after which an observation counts 1/e
+  double doubtful_share{0.3};     ///< of the blocked satellites that are received strongly: heading or map is wrong
+
+  template <class V>
+  void visit(V& v) {
+    v("strong_cn0", strong_cn0, between(0.0, 70.0));
+    v("consistency_time", consistency_time, positive());
+    v("doubtful_share", doubtful_share, between(0.01, 1.0));
+  }
+  void check(std::vector<std::string>&) const {}
+};
+
+/// Whether what the map says agrees with what is received. Behind a building a signal is weak or not there at all. With
+/// a heading that is far off, or a map that is wrong, as many of the satellites that are said to be blocked are
+/// received strongly as of any others; a street that looks the same both ways hides it.
+class MapConsistency {
+ public:
+  /// Requires parameters without faults.
+  explicit MapConsistency(const MapConsistencyParameters& parameters) : parameters_(parameters) {}
+
+  /// The satellites of one fix with their blocked fractions; those of which the map says nothing do not count.
+  void add(Stamp stamp, const std::vector<SatelliteObservation>& satellites);
+
+  /// Share of the blocked satellites that are received strongly, lately; NaN before there is enough to tell.
+  double strong_share() const;
+  bool is_doubtful() const { return strong_share() >= parameters_.doubtful_share; }
+  void reset() { *this = MapConsistency(parameters_); }
+
+ private:
+  static constexpr double kBlocked = 0.8;            ///< of a satellite's rays: surely blocked
+  static constexpr double kEnough_s = 30.0;          ///< satellites times seconds
+  static constexpr double kLongestInterval_s = 1.0;  ///< for which the satellites of one fix stand
+
+  MapConsistencyParameters parameters_;
+  std::optional<Stamp> last_;
+  double blocked_s_{0.0};
+  double strong_s_{0.0};
+};
+
+}  // namespace urban_gnss
