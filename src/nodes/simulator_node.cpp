@@ -95,18 +95,20 @@ class SimulatorNode {
 
  private:
   void make_world(const ros::NodeHandle& private_node) {
-    ParameterReader which(private_parameters(private_node));
-    which.read(parameters_);
+    ParameterReader reader = private_parameter_reader(private_node);
+    reader.read(frames_).read(parameters_);
     if (parameters_.field == Field::kPaperField) {
       PaperFieldParameters field;
-      read_private_parameters(private_node, field, motion_, frames_, parameters_);
+      reader.read(field).read(motion_);
+      finish_reading(private_node, reader);
       simulator_ = std::make_unique<PaperFieldSimulator>(field, motion_);
       field_ = field;
       datum_ = {parameters_.datum[0], parameters_.datum[1], parameters_.datum[2]};
       return;
     }
     SeedParameter seed;
-    read_private_parameters(private_node, frames_, parameters_, seed);
+    reader.read(seed);
+    finish_reading(private_node, reader);
     std::vector<std::string> overrides;
     if (seed.seed >= 0) overrides.push_back("seed=" + std::to_string(seed.seed));
     auto city = std::make_unique<CitySimulator>(load_scenario(parameters_.scenario, overrides));

@@ -33,6 +33,17 @@ YAML::Node private_parameters(const ros::NodeHandle& private_node) {
   return to_yaml(value);
 }
 
+ParameterReader private_parameter_reader(const ros::NodeHandle& private_node) {
+  ParameterReader reader(private_parameters(private_node));
+  reader.ignore("diagnostic_period");  // diagnostic_updater's own
+  return reader;
+}
+
+void finish_reading(const ros::NodeHandle& private_node, const ParameterReader& reader) {
+  const auto faults = reader.finish();
+  if (!faults.empty()) throw ParameterError(private_node.getNamespace(), faults);
+}
+
 int run_node(int argc, char** argv, const std::string& name,
              const std::function<std::shared_ptr<void>(ros::NodeHandle&, ros::NodeHandle&)>& make) {
   ros::init(argc, argv, name);

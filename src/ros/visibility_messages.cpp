@@ -1,10 +1,8 @@
 #include "urban_gnss_localization/ros/visibility_messages.hpp"
 
-#include <sensor_msgs/image_encodings.h>
 #include <sensor_msgs/point_cloud2_iterator.h>
 
 #include <algorithm>
-#include <array>
 #include <boost/endian/conversion.hpp>
 #include <cmath>
 #include <cstring>
@@ -12,6 +10,7 @@
 #include <stdexcept>
 
 #include "marker_parts.hpp"
+#include "visibility_colours.hpp"
 
 namespace urban_gnss {
 namespace {
@@ -69,14 +68,6 @@ std::uint8_t visibility_class(const SatelliteAssessment& assessment, const Satel
   if (!assessment.is_visible) return msgs::SatelliteVisibility::BLOCKED;
   const bool is_known = !has_map || satellite.known_fraction >= 0.5;
   return is_known ? msgs::SatelliteVisibility::FREE : msgs::SatelliteVisibility::UNKNOWN;
-}
-
-Colour colour_of(std::uint8_t visibility) {
-  switch (visibility) {
-    case msgs::SatelliteVisibility::FREE: return {0.2F, 0.9F, 0.3F, 0.9F};
-    case msgs::SatelliteVisibility::BLOCKED: return {1.0F, 0.55F, 0.0F, 0.9F};
-    default: return {0.6F, 0.6F, 0.65F, 0.8F};
-  }
 }
 
 }  // namespace
@@ -217,73 +208,16 @@ visualization_msgs::MarkerArray ray_markers(const FixAssessment& assessment, con
     const double length = std::isfinite(satellite.range) ? satellite.range : kFreeRay_m;
     const Eigen::Vector3d to = from + length * (turn * line_of_sight({satellite.azimuth, satellite.elevation}));
     Marker ray = make_marker("rays", id, Marker::LINE_STRIP, colour_of(satellite.visibility), time, frame);
-    ray.scale.x = 0.2;
+    ray.scale.x = 0.35;
     ray.points = {point(from), point(to)};
     Marker label = make_marker("names", id, Marker::TEXT_VIEW_FACING, {1.0F, 1.0F, 1.0F, 0.9F}, time, frame);
     label.pose.position = point(to);
-    label.scale.z = 2.0;
+    label.scale.z = 2.5;
     label.text = satellite.name;
     markers.markers.push_back(ray);
     markers.markers.push_back(label);
   }
   return markers;
-}
-
-sensor_msgs::Image sky_plot(const msgs::Visibility& visibility, const std::vector<double>& skyline, int size) {
-  sensor_msgs::Image image;
-  image.header = visibility.header;
-  image.encoding = sensor_msgs::image_encodings::RGB8;
-  image.width = image.height = static_cast<std::uint32_t>(size);
-  image.step = 3 * image.width;
-  image.data.assign(static_cast<std::size_t>(image.step) * image.height, 255);
-  const double middle = 0.5 * (size - 1);
-  const double radius = 0.47 * size;  // of the horizon
-  const auto set = [&](int column, int row, const std::array<double, 3>& rgb) {
-    if (column < 0 || row < 0 || column >= size || row >= size) return;
-    const std::size_t at = static_cast<std::size_t>(row) * image.step + 3 * static_cast<std::size_t>(column);
-    for (std::size_t k = 0; k < 3; ++k) image.data[at + k] = static_cast<std::uint8_t>(std::lround(255.0 * rgb[k]));
-  };
-  for (int row = 0; row < size; ++row) {
-    for (int column = 0; column < size; ++column) {
-      const double east = (column - middle) / radius;
-      const double north = (middle - row) / radius;
-      const double from_zenith = std::hypot(east, north);
-      if (from_zenith > 1.0) continue;
-      const double elevation = 0.5 * kPi * (1.0 - from_zenith);
-      bool is_blocked = false;
-      if (!skyline.empty()) {
-        const double turns = std::atan2(east, north) / (2.0 * kPi);
-        const auto steps = static_cast<double>(skyline.size());
-        const auto step = static_cast<std::size_t>(std::lround((turns - std::floor(turns)) * steps)) % skyline.size();
-        is_blocked = elevation <= skyline[step];
-      }
-      // Circles every 30 degrees and the cross of the four directions.
-      const double ring = std::abs(std::remainder(elevation, kPi / 6.0)) * radius / (0.5 * kPi);
-      const bool is_line = ring < 0.5 || std::abs(column - middle) < 0.5 || std::abs(row - middle) < 0.5;
-      set(column, row,
-          is_line      ? std::array<double, 3>{0.75, 0.78, 0.82}
-          : is_blocked ? std::array<double, 3>{0.42, 0.4, 0.38}
-                       : std::array<double, 3>{0.9, 0.95, 1.0});
-    }
-  }
-  for (const msgs::SatelliteVisibility& satellite : visibility.satellites) {
-    if (!std::isfinite(satellite.azimuth) || !(satellite.elevation >= 0.0F)) continue;
-    const double from_zenith = radius * (1.0 - satellite.elevation / (0.5 * kPi));
-    const double column = middle + from_zenith * std::sin(satellite.azimuth);
-    const double row = middle - from_zenith * std::cos(satellite.azimuth);
-    const Colour colour = colour_of(satellite.visibility);
-    const int disc = std::max(2, size / 60);
-    for (int dr = -disc; dr <= disc; ++dr) {
-      for (int dc = -disc; dc <= disc; ++dc) {
-        const int squared = dr * dr + dc * dc;
-        if (squared > disc * disc) continue;
-        const bool is_rim = squared > (disc - 1) * (disc - 1);
-        set(static_cast<int>(std::lround(column)) + dc, static_cast<int>(std::lround(row)) + dr,
-            is_rim ? std::array<double, 3>{0.1, 0.1, 0.1} : std::array<double, 3>{colour.r, colour.g, colour.b});
-      }
-    }
-  }
-  return image;
 }
 
 }  // namespace urban_gnss

@@ -198,7 +198,7 @@ TEST(OcclusionPipeline, CloudsThatCannotBeUsed) {
   const float nan = std::numeric_limits<float>::quiet_NaN();
   EXPECT_EQ(add(0.0, {}), CloudDecision::kEmpty);
   EXPECT_EQ(add(1.0, PointCloud(50, Eigen::Vector3f(nan, nan, nan))), CloudDecision::kEmpty);
-  EXPECT_EQ(add(2.0, PointCloud(50, Eigen::Vector3f(5, 0, -2))), CloudDecision::kEmpty);  // the ground
+  EXPECT_EQ(add(2.0, PointCloud(50, Eigen::Vector3f(0.5F, 0, -0.5F))), CloudDecision::kEmpty);  // the robot
   EXPECT_EQ(add(3.0, scan(), at(kNaN, 0, 0)), CloudDecision::kNotFinite);
   EXPECT_EQ(pipeline.local_map().map().size(), 0u);
   EXPECT_EQ(add(0.0, scan()), CloudDecision::kInserted) << "none of these counts as the last cloud";
@@ -228,13 +228,83 @@ TEST(OcclusionPipeline, BadSatellitesAndHeadings) {
   feed(pipeline, {}, satellites);
   pipeline.set_satellites(kStart, satellites, kNaN);
   pipeline.set_alignment({kStart, {0.0, 0.0, kNaN}, 0.0});
-  pipeline.set_alignment({kStart, {0.0, 0.0, 1.0}, kNaN});
   pipeline.set_antenna({kNaN, 0.0, 0.0});
   const FixAssessment fix = assess(pipeline);
   expect_honest(fix);
   EXPECT_EQ(fix.missing, "");
   EXPECT_EQ(blocked(fix, kBehind), 1.0);
   for (const std::size_t bad : {kAlong, kAway, kBackAlong}) EXPECT_TRUE(std::isnan(blocked(fix, bad))) << bad;
+}
+
+TEST(OcclusionPipeline, AnOpenFieldIsNoMissingMap) {
+  OcclusionPipeline pipeline(parameters());
+  feed(pipeline, {false});
+  EXPECT_EQ(assess(pipeline).missing, "clouds");
+  const PointCloud ground(50, Eigen::Vector3f(5, 0, -2));
+  EXPECT_EQ(pipeline.add_cloud(kStart, ground, kSensor, at(0, 0, 0)).decision, CloudDecision::kInserted);
+  EXPECT_EQ(pipeline.local_map().map().size(), 0u);
+  const FixAssessment fix = assess(pipeline);
+  EXPECT_EQ(fix.missing, "");
+  EXPECT_TRUE(fix.has_map);
+  for (std::size_t i = 0; i < fix.satellites.size(); ++i) EXPECT_EQ(blocked(fix, i), 0.0) << i;
+  expect_honest(fix);
+}
+
+TEST(OcclusionPipeline, AHeadingWithoutAVarianceIsNotKnown) {
+  for (const double yaw_sigma : {kNaN, -1.0, std::numeric_limits<double>::infinity()}) {
+    OcclusionPipeline pipeline(parameters());
+    feed(pipeline);
+    pipeline.set_alignment({kStart, {0.0, 0.0, 0.0}, yaw_sigma});
+    const FixAssessment fix = assess(pipeline);
+    EXPECT_EQ(fix.missing, "a heading") << yaw_sigma;
+    EXPECT_FALSE(fix.has_map);
+    expect_honest(fix);
+    feed(pipeline, {false, true, false});
+    EXPECT_EQ(assess(pipeline).missing, "");
+  }
+}
+
+TEST(OcclusionPipeline, SatellitesAreThoseOfTheFixsOwnStamp) {
+  OcclusionPipeline pipeline(parameters());
+  const auto at_s = [](double after_s) { return kStart + from_seconds(after_s); };
+  feed(pipeline, {true, true, false});
+  EXPECT_FALSE(pipeline.awaits_satellites(at_s(0.0))) << "nobody has sent any";
+  for (const double after_s : {0.0, 0.2, 0.4}) {  // one more each time
+    Sky satellites = sky(45.0);
+    satellites.resize(static_cast<std::size_t>(3.0 + 5.0 * after_s + 0.5));
+    pipeline.set_satellites(at_s(after_s), satellites, 0.0);
+  }
+  EXPECT_EQ(assess(pipeline, 0.2).satellites.size(), 4u);
+  EXPECT_FALSE(pipeline.awaits_satellites(at_s(0.4)));
+  EXPECT_TRUE(pipeline.awaits_satellites(at_s(0.6)));
+  EXPECT_EQ(assess(pipeline, 0.59).satellites.size(), 5u) << "those next to it in time";
+  EXPECT_FALSE(pipeline.awaits_satellites(at_s(0.8))) << "the last fix had none of its own";
+  pipeline.set_satellites(at_s(0.59), sky(45.0), 0.0);
+  EXPECT_TRUE(pipeline.awaits_satellites(at_s(0.8))) << "they came late, but came";
+  pipeline.reset();
+  EXPECT_FALSE(pipeline.awaits_satellites(at_s(0.8)));
+}
+
+TEST(OcclusionPipeline, AHeadingThatDoesNotFitIsDoubted) {
+  Sky satellites = sky(45.0);
+  satellites[kBehind].cn0_dbhz = 25.0;
+  for (const double yaw : {0.0, kPi}) {
+    OcclusionPipeline pipeline(parameters());
+    feed(pipeline);
+    FixAssessment fix;
+    for (double after_s = 0.0; after_s < 60.0; after_s += 0.5) {
+      const Stamp stamp = kStart + from_seconds(after_s);
+      pipeline.set_alignment({stamp, {0.0, 0.0, yaw}, 0.0});
+      pipeline.set_satellites(stamp, satellites, 0.0);
+      fix = assess(pipeline, after_s);
+      if (after_s < 20.0) EXPECT_TRUE(std::isnan(fix.strong_share)) << "too early to tell: " << after_s;
+    }
+    EXPECT_EQ(fix.strong_share, yaw == 0.0 ? 0.0 : 1.0);
+    EXPECT_EQ(fix.doubt.empty(), yaw == 0.0);
+    pipeline.reset();
+    feed(pipeline);
+    EXPECT_TRUE(std::isnan(assess(pipeline).strong_share));
+  }
 }
 
 TEST(OcclusionPipeline, TheAntennaIsInItsPlace) {

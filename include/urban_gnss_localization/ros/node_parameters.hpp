@@ -13,14 +13,17 @@ namespace urban_gnss {
 /// way.
 YAML::Node private_parameters(const ros::NodeHandle& private_node);
 
+/// For a node that learns from one struct which others to read: finish_reading() must come last.
+ParameterReader private_parameter_reader(const ros::NodeHandle& private_node);
+/// Throws ParameterError with every fault.
+void finish_reading(const ros::NodeHandle& private_node, const ParameterReader& reader);
+
 /// Reads structs out of the node's private parameters. Throws ParameterError with every fault of all of them.
 template <class... P>
 void read_private_parameters(const ros::NodeHandle& private_node, P&... parameters) {
-  ParameterReader reader(private_parameters(private_node));
-  reader.ignore("diagnostic_period");  // diagnostic_updater's own
+  ParameterReader reader = private_parameter_reader(private_node);
   (reader.read(parameters), ...);
-  const auto faults = reader.finish();
-  if (!faults.empty()) throw ParameterError(private_node.getNamespace(), faults);
+  finish_reading(private_node, reader);
 }
 
 /// The main function of a node: initialises ROS, makes the node, spins. A node whose parameters are bad, or that fails
