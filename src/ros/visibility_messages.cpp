@@ -212,7 +212,7 @@ visualization_msgs::MarkerArray ray_markers(const FixAssessment& assessment, con
     ray.points = {point(from), point(to)};
     Marker label = make_marker("names", id, Marker::TEXT_VIEW_FACING, {1.0F, 1.0F, 1.0F, 0.9F}, time, frame);
     label.pose.position = point(to);
-    label.scale.z = 2.5;
+    label.scale.z = 3.0;
     label.text = satellite.name;
     markers.markers.push_back(ray);
     markers.markers.push_back(label);

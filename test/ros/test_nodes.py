@@ -15,6 +15,8 @@ NODES = {
                              ["ring_share = 2", "particle_count = 0", "did you mean mode?", "literal, paper, conventional"]),
     "gps_bias_node": (["_shadow_sigma:=-1.0", "_bias_input:=residuals", "_gate:=0.5"],
                       ["shadow_sigma = -1", "residual, position", "gate: no such parameter"]),
+    "occlusion_node": (["_voxel_size:=-1.0", "_model:=best", "_windw:=3.0"],
+                       ["voxel_size = -1", "conventional, paper, soft", "did you mean window?"]),
     "simulator_node": (["_target_count:=1", "_interval:=0.0", "_datum:=[95.0, 0.0, 0.0]"],
                        ["target_count = 1", "interval = 0", "datum"]),
     "waypoint_controller_node": (["_speed:=fast", "_targets:=[1.0, 2.0, 3.0]"],
