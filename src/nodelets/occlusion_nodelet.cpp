@@ -1,9 +1,9 @@
 // The nodelet urban_gnss_localization/occlusion: OcclusionNode in the process of a lidar's driver.
 
 #include <nodelet/nodelet.h>
-#include <pluginlib/class_list_macros.hpp>
 
 #include <memory>
+#include <pluginlib/class_list_macros.hpp>
 
 #include "urban_gnss_localization/ros/occlusion_node.hpp"
 
