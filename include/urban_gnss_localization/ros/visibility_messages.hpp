@@ -44,8 +44,8 @@ visualization_msgs::MarkerArray ray_markers(const FixAssessment& assessment,
                                             const ros::Time& time, const std::string& frame);
 
 /// The sky with north up and east right, zenith in the middle: what the map blocks dark (`skyline`, rad, by equal steps
-/// of azimuth; empty without a map), satellites as discs with their names, in the colours of ray_markers(), 8-bit RGB,
-/// `size` pixels square.
+/// of azimuth; empty without a map), satellites as discs with their names, in the colours of ray_markers() (white: not
+/// received), 8-bit RGB, `size` pixels square.
 sensor_msgs::Image sky_plot(const urban_gnss_localization::Visibility& visibility, const std::vector<double>& skyline,
                             int size);
 
