@@ -16,23 +16,7 @@ constexpr double kDropInterval = 0.05;
 /// Beyond max_voxels so much more is dropped, so that it does not happen at every scan.
 constexpr double kLimitReserve = 0.1;
 
-static_assert(VoxelMap::kCellVoxels == 4);
-
-VoxelCoordinates cell_of(const VoxelCoordinates& voxel) {
-  return {voxel.x() >> 2, voxel.y() >> 2, voxel.z() >> 2};  // rounds down below zero, too
-}
-
-std::uint64_t bit_in_cell(const VoxelCoordinates& voxel) {
-  const auto bits = [&](int level) {
-    return (voxel.x() >> level & 1) | (voxel.y() >> level & 1) << 1 | (voxel.z() >> level & 1) << 2;
-  };
-  return std::uint64_t{1} << static_cast<unsigned>(8 * bits(1) + bits(0));
-}
-
-/// How many of a cell's voxels come before this one.
-VoxelMap::Index rank(std::uint64_t mask, std::uint64_t bit) {
-  return static_cast<VoxelMap::Index>(__builtin_popcountll(mask & (bit - 1)));
-}
+static_assert(VoxelMap::kCellVoxels == 4 && VoxelMap::kBrickCells == 4);
 
 /// Calls visit(dx, dy, dz) for a cell and its neighbours.
 template <class Visit>
@@ -100,10 +84,10 @@ void VoxelMap::add_point(const Eigen::Vector3f& point, InsertReport& report) {
   }
   const VoxelCoordinates coordinates = voxel_of(point.cast<double>(), inverse_voxel_);
   const VoxelCoordinates cell_coordinates = cell_of(coordinates);
-  const std::uint64_t bit = bit_in_cell(coordinates);
+  const std::uint64_t bit = bit_of(coordinates);
   const Index found = find_cell(cell_coordinates);
-  if (found != kNone && (cells_[found].mask & bit) != 0) {
-    const Index voxel = cells_[found].begin + rank(cells_[found].mask, bit);
+  if (found != kNone && (masks_[found] & bit) != 0) {
+    const Index voxel = blocks_[found].begin + rank(masks_[found], bit);
     // The mean follows at least every thousandth return, so that an old voxel is not deaf.
     const std::uint32_t count = std::min(++counts_[voxel].returns, 1000U);
     surface_[voxel].mean += (point - surface_[voxel].mean) / static_cast<float>(count);
@@ -112,48 +96,64 @@ void VoxelMap::add_point(const Eigen::Vector3f& point, InsertReport& report) {
   ++report.new_voxels;
   ++size_;
   bounds_.extend(point.cast<double>());
-  Cell& cell = cells_[found != kNone && cells_[found].mask != 0 ? found : occupy(cell_coordinates)];
-  if (cell.count == 0 || cell.count == room(cell.size_class)) {
-    const std::size_t size_class = cell.count == 0 ? 0 : cell.size_class + 1U;
+  const Index cell = found != kNone && masks_[found] != 0 ? found : occupy(cell_coordinates);
+  Block& block = blocks_[cell];
+  if (block.count == 0 || block.count == room(block.size_class)) {
+    const std::size_t size_class = block.count == 0 ? 0 : block.size_class + 1U;
     const Index begin = take_block(size_class);
-    for (Index i = 0; i < cell.count; ++i) copy_voxel(cell.begin + i, begin + i);
-    if (cell.count > 0) unused_blocks_[cell.size_class].push_back(cell.begin);
-    cell.begin = begin;
-    cell.size_class = static_cast<std::uint8_t>(size_class);
+    for (Index i = 0; i < block.count; ++i) copy_voxel(block.begin + i, begin + i);
+    if (block.count > 0) unused_blocks_[block.size_class].push_back(block.begin);
+    block.begin = begin;
+    block.size_class = static_cast<std::uint8_t>(size_class);
   }
-  const Index voxel = cell.begin + rank(cell.mask, bit);
-  for (Index i = cell.begin + cell.count; i > voxel; --i) copy_voxel(i - 1, i);
+  const Index voxel = block.begin + rank(masks_[cell], bit);
+  for (Index i = block.begin + block.count; i > voxel; --i) copy_voxel(i - 1, i);
   surface_[voxel] = {point, 0.0F};
   counts_[voxel] = {1, 0, 0};
-  cell.mask |= bit;
-  ++cell.count;
+  masks_[cell] |= bit;
+  ++block.count;
+}
+
+VoxelMap::Index VoxelMap::find_or_add_brick(const VoxelCoordinates& coordinates) {
+  const auto fresh = unused_bricks_.empty() ? static_cast<Index>(near_.size()) : unused_bricks_.back();
+  const Index brick = brick_index_.find_or_insert(voxel_key(coordinates), fresh);
+  if (brick != fresh) return brick;
+  if (unused_bricks_.empty()) {
+    near_.push_back(0);
+    const std::size_t size = kPlaces * near_.size();
+    nearby_.resize(size);
+    masks_.resize(size);
+    blocks_.resize(size);
+  } else {
+    unused_bricks_.pop_back();
+  }
+  return brick;
 }
 
 VoxelMap::Index VoxelMap::occupy(const VoxelCoordinates& center) {
   for_each_nearby([&](int x, int y, int z) {
-    const auto fresh = unused_cells_.empty() ? static_cast<Index>(cells_.size()) : unused_cells_.back();
-    const Index cell = cell_index_.find_or_insert(voxel_key(center + VoxelCoordinates(x, y, z)), fresh);
-    if (cell == fresh) {
-      if (unused_cells_.empty()) {
-        cells_.emplace_back();
-      } else {
-        cells_[cell] = {};
-        unused_cells_.pop_back();
-      }
-    }
-    cells_[cell].nearby |= nearby_bit(-x, -y, -z);
+    const VoxelCoordinates neighbour = center + VoxelCoordinates(x, y, z);
+    const Index brick = find_or_add_brick(brick_of(neighbour));
+    const Index place = place_of(neighbour);
+    near_[brick] |= std::uint64_t{1} << place;
+    nearby_[kPlaces * brick + place] |= nearby_bit(-x, -y, -z);
   });
   return find_cell(center);
 }
 
 void VoxelMap::release(const VoxelCoordinates& center) {
   for_each_nearby([&](int x, int y, int z) {
-    const auto key = voxel_key(center + VoxelCoordinates(x, y, z));
-    const Index cell = cell_index_.find(key);
-    cells_[cell].nearby &= ~nearby_bit(-x, -y, -z);
-    if (cells_[cell].nearby != 0) return;
-    cell_index_.erase(key);
-    unused_cells_.push_back(cell);
+    const VoxelCoordinates neighbour = center + VoxelCoordinates(x, y, z);
+    const auto key = voxel_key(brick_of(neighbour));
+    const Index brick = brick_index_.find(key);
+    const Index place = place_of(neighbour);
+    std::uint32_t& nearby = nearby_[kPlaces * brick + place];
+    nearby &= ~nearby_bit(-x, -y, -z);
+    if (nearby != 0) return;
+    near_[brick] &= ~(std::uint64_t{1} << place);
+    if (near_[brick] != 0) return;
+    brick_index_.erase(key);
+    unused_bricks_.push_back(brick);
   });
 }
 
@@ -192,7 +192,7 @@ void VoxelMap::follow_ray(const Eigen::Vector3d& sensor, const Eigen::Vector3d& 
   const double pass_end_m = length_m - 2.0 * parameters_.voxel_size;
   walk_voxels(sensor, direction, 0.0, pass_end_m, cell_edge_m_, [&](const auto& cell, double from_m, double to_m) {
     const Index found = find_cell(cell);
-    if (found == kNone || cells_[found].mask == 0) return true;
+    if (found == kNone || masks_[found] == 0) return true;
     walk_voxels(sensor, direction, from_m, to_m, parameters_.voxel_size, [&](const auto& coordinates, double, double) {
       const Index voxel = find_voxel(coordinates);
       if (voxel != kNone && voxel != last && meets(voxel)) count_meeting(voxel, &Counts::passes);
@@ -213,8 +213,8 @@ void VoxelMap::count_meeting(Index voxel, std::uint32_t Counts::*kind) {
 
 template <class Visit>
 void VoxelMap::for_each_voxel(Visit&& visit) const {
-  for (const Cell& cell : cells_) {
-    for (Index voxel = cell.begin; voxel != cell.begin + cell.count; ++voxel) visit(voxel);
+  for (const Block& block : blocks_) {
+    for (Index voxel = block.begin; voxel != block.begin + block.count; ++voxel) visit(voxel);
   }
 }
 
@@ -224,24 +224,27 @@ std::size_t VoxelMap::drop_beyond(const Eigen::Vector3d& center, double distance
   const std::size_t size_before = size_;
   std::vector<VoxelCoordinates> emptied;
   bounds_.setEmpty();
-  cell_index_.for_each([&](KeyIndex::Key key, Index index) {
-    Cell& cell = cells_[index];
-    if (cell.count == 0) return;
-    Index kept = cell.begin;
-    Index voxel = cell.begin;
-    for (std::uint64_t rest = cell.mask; rest != 0; rest &= rest - 1, ++voxel) {
-      if ((surface_[voxel].mean - single).squaredNorm() > limit) {
-        cell.mask &= ~(rest & (~rest + 1));  // the lowest bit of what remains
-        continue;
+  brick_index_.for_each([&](KeyIndex::Key key, Index brick) {
+    for (Index place = 0; place < kPlaces; ++place) {
+      std::uint64_t& mask = masks_[kPlaces * brick + place];
+      if (mask == 0) continue;
+      Block& block = blocks_[kPlaces * brick + place];
+      Index kept = block.begin;
+      Index voxel = block.begin;
+      for (std::uint64_t rest = mask; rest != 0; rest &= rest - 1, ++voxel) {
+        if ((surface_[voxel].mean - single).squaredNorm() > limit) {
+          mask &= ~(rest & (~rest + 1));  // the lowest bit of what remains
+          continue;
+        }
+        bounds_.extend(surface_[voxel].mean.cast<double>());
+        copy_voxel(voxel, kept++);
       }
-      bounds_.extend(surface_[voxel].mean.cast<double>());
-      copy_voxel(voxel, kept++);
+      size_ -= voxel - kept;
+      block.count = static_cast<std::uint8_t>(kept - block.begin);
+      if (block.count > 0) continue;
+      unused_blocks_[block.size_class].push_back(block.begin);
+      emptied.push_back(kBrickCells * voxel_of_key(key) + at_place(place));
     }
-    size_ -= voxel - kept;
-    cell.count = static_cast<std::uint8_t>(kept - cell.begin);
-    if (cell.count > 0) return;
-    unused_blocks_[cell.size_class].push_back(cell.begin);
-    emptied.push_back(voxel_of_key(key));
   });
   for (const VoxelCoordinates& cell : emptied) release(cell);
   return size_before - size_;
@@ -268,9 +271,9 @@ VoxelMap::Index VoxelMap::find(const Eigen::Vector3d& point) const {
 
 VoxelMap::Index VoxelMap::find_voxel(const VoxelCoordinates& voxel) const {
   const Index cell = find_cell(cell_of(voxel));
-  const std::uint64_t bit = bit_in_cell(voxel);
-  if (cell == kNone || (cells_[cell].mask & bit) == 0) return kNone;
-  return cells_[cell].begin + rank(cells_[cell].mask, bit);
+  const std::uint64_t bit = bit_of(voxel);
+  if (cell == kNone || (masks_[cell] & bit) == 0) return kNone;
+  return blocks_[cell].begin + rank(masks_[cell], bit);
 }
 
 PointCloud VoxelMap::points_within(const Eigen::Vector3d& center, double radius_m) const {
@@ -291,10 +294,12 @@ PointCloud VoxelMap::points() const {
 }
 
 std::size_t VoxelMap::memory_bytes() const {
-  std::size_t indices = unused_cells_.capacity();
+  std::size_t indices = unused_bricks_.capacity();
   for (const auto& unused : unused_blocks_) indices += unused.capacity();
-  return cell_index_.memory_bytes() + observed_.memory_bytes() + cells_.capacity() * sizeof(Cell) +
-         surface_.capacity() * (sizeof(Surface) + sizeof(Counts)) + indices * sizeof(Index);
+  return brick_index_.memory_bytes() + observed_.memory_bytes() + near_.capacity() * sizeof(std::uint64_t) +
+         nearby_.capacity() * sizeof(std::uint32_t) + masks_.capacity() * sizeof(std::uint64_t) +
+         blocks_.capacity() * sizeof(Block) + surface_.capacity() * (sizeof(Surface) + sizeof(Counts)) +
+         indices * sizeof(Index);
 }
 
 }  // namespace urban_gnss

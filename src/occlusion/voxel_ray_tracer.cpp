@@ -101,6 +101,29 @@ class RayNeighbourhood {
   std::array<float, kCapacity> along_m_;
 };
 
+/// Places as a ray sees them: x and y (m) across it, z (m) along it, the fourth number unused. Written by columns,
+/// which are added as whole vectors.
+class RayFrame {
+ public:
+  RayFrame(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) : origin_(origin.cast<float>()) {
+    const Eigen::Vector3f along = direction.cast<float>();
+    const Eigen::Vector3f u = along.unitOrthogonal();
+    axes_ << u.transpose(), along.cross(u).transpose(), along.transpose(), Eigen::RowVector3f::Zero();
+  }
+
+  Eigen::Vector4f turned(const Eigen::Vector3f& offset) const {
+    return axes_.col(0) * offset.x() + axes_.col(1) * offset.y() + axes_.col(2) * offset.z();
+  }
+  /// Shifted so that the ray is kept off the lines between points of a regular grid.
+  Eigen::Vector4f place(const Eigen::Vector3f& point) const {
+    return turned(point - origin_) + Eigen::Vector4f(6e-5F, 8e-5F, 0.0F, 0.0F);
+  }
+
+ private:
+  Eigen::Matrix<float, 4, 3> axes_;
+  Eigen::Vector3f origin_;
+};
+
 /// The part of a ray inside a box; empty (begin > end) where it misses it.
 struct Stretch {
   double begin_m;
@@ -154,59 +177,34 @@ RayVerdict VoxelRayTracer::trace(const Eigen::Vector3d& origin, const Eigen::Vec
   const Stretch inside = clip(origin, direction, bounds, {parameters_.min_range, parameters_.max_range});
   if (inside.begin_m > inside.end_m) return verdict;
 
-  // Two axes across the ray, and a shift that keeps it off the lines between points of a regular grid.
-  const Eigen::Vector3f axis = direction.cast<float>();
-  const Eigen::Vector3f u = axis.unitOrthogonal();
-  const Eigen::Vector3f v = axis.cross(u);
-  const Eigen::Vector2f shift(6e-5F, 8e-5F);
-  const Eigen::Vector3f start = origin.cast<float>();
+  const RayFrame frame(origin, direction);
   const auto link_m = static_cast<float>(link_m_);
   const double reach_m = kReach * link_m_;
   const auto squared_reach = static_cast<float>(reach_m * reach_m);
   const double edge_m = map_->cell_edge_m();
-  const double octant_reach_m = reach_m + 0.25 * std::sqrt(3.0) * edge_m;  // to the middle of an octant
-  const auto squared_octant_reach = static_cast<float>(octant_reach_m * octant_reach_m);
+  const double inverse_voxel = 1.0 / map_->parameters().voxel_size;
   RayNeighbourhood solid;
   RayNeighbourhood permeable;
 
-  const auto visit = [&](const VoxelCoordinates& cell, double from_m, double to_m) {
-    const VoxelMap::Index center = map_->find_cell(cell);
-    if (center == VoxelMap::kNone) return true;
+  const auto visit = [&](VoxelMap::Index center, const VoxelCoordinates& cell, double from_m, double to_m) {
     solid.clear();
     permeable.clear();
     const auto nearest_m = static_cast<float>(std::max(from_m - reach_m, parameters_.min_range));
     const auto farthest_m = static_cast<float>(std::min(to_m + reach_m, parameters_.max_range));
     const auto gather = [&](VoxelMap::Index voxel) {
-      const Eigen::Vector3f offset = map_->position(voxel) - start;
-      const float along_m = offset.dot(axis);
-      if (along_m < nearest_m || along_m > farthest_m) return;
-      const Eigen::Vector2f across(offset.dot(u) + shift.x(), offset.dot(v) + shift.y());
-      if (across.squaredNorm() > squared_reach) return;
+      const Eigen::Vector4f place = frame.place(map_->position(voxel));
+      const float along_m = place.z();
+      const Eigen::Vector2f across = place.head<2>();
+      if (along_m < nearest_m || along_m > farthest_m || across.squaredNorm() > squared_reach) return;
       const bool is_solid = map_->permeability(voxel) <= parameters_.max_permeability;
       (is_solid ? solid : permeable).add(across, map_->position(voxel), along_m);
     };
-    const auto gather_cell = [&](const VoxelCoordinates& coordinates) {
-      const Eigen::Vector3f corner = (edge_m * coordinates.cast<double>() - origin).cast<float>();
-      map_->for_each_octant(map_->find_cell(coordinates), [&](int octant, VoxelMap::Index begin, VoxelMap::Index end) {
-        const Eigen::Vector3f half(octant & 1 ? 0.75F : 0.25F, octant & 2 ? 0.75F : 0.25F, octant & 4 ? 0.75F : 0.25F);
-        const Eigen::Vector3f middle = corner + static_cast<float>(edge_m) * half;
-        if ((middle - middle.dot(axis) * axis).squaredNorm() > squared_octant_reach) return;
-        for (VoxelMap::Index voxel = begin; voxel != end; ++voxel) gather(voxel);
-      });
-    };
-    // The cells that the ray's stretch, widened by the reach, touches: never more than the neighbours.
+    // The voxels that the box about the stretch, widened by the reach, touches: in the cell and its neighbours.
     const Eigen::Vector3d a = origin + from_m * direction;
     const Eigen::Vector3d b = origin + to_m * direction;
-    const VoxelCoordinates low = voxel_of((a.cwiseMin(b).array() - reach_m).matrix(), 1.0 / edge_m) - cell;
-    const VoxelCoordinates high = voxel_of((a.cwiseMax(b).array() + reach_m).matrix(), 1.0 / edge_m) - cell;
-    for (int x = std::max(low.x(), -1); x <= std::min(high.x(), 1); ++x) {
-      for (int y = std::max(low.y(), -1); y <= std::min(high.y(), 1); ++y) {
-        for (int z = std::max(low.z(), -1); z <= std::min(high.z(), 1); ++z) {
-          if (!map_->is_occupied_nearby(center, x, y, z)) continue;
-          gather_cell(cell + VoxelCoordinates(x, y, z));
-        }
-      }
-    }
+    const VoxelCoordinates low = voxel_of((a.cwiseMin(b).array() - reach_m).matrix(), inverse_voxel);
+    const VoxelCoordinates high = voxel_of((a.cwiseMax(b).array() + reach_m).matrix(), inverse_voxel);
+    map_->for_each_nearby_voxel(center, cell, low, high, gather);
     if (solid.is_surrounded() && solid.pierced(link_m, verdict.range_m)) {
       verdict.blocked = true;
       return false;
@@ -215,7 +213,20 @@ RayVerdict VoxelRayTracer::trace(const Eigen::Vector3d& origin, const Eigen::Vec
     if (permeable.is_surrounded() && permeable.pierced(link_m, unused_m)) verdict.vegetation_m += to_m - from_m;
     return true;
   };
-  walk_voxels(origin, direction, inside.begin_m, inside.end_m, edge_m, visit);
+
+  const auto visit_brick = [&](const VoxelCoordinates& coordinates, double brick_from_m, double brick_to_m) {
+    const VoxelMap::Index brick = map_->find_brick(coordinates);
+    if (brick == VoxelMap::kNone) return true;
+    walk_voxels(origin, direction, brick_from_m, brick_to_m, edge_m,
+                [&](const VoxelCoordinates& cell, double from_m, double to_m) {
+                  // On the border rounding may lead into the next brick, for less than a hair's breadth.
+                  if (VoxelMap::brick_of(cell) != coordinates) return true;
+                  const VoxelMap::Index found = map_->find_cell(brick, cell);
+                  return found == VoxelMap::kNone || visit(found, cell, from_m, to_m);
+                });
+    return !verdict.blocked;
+  };
+  walk_voxels(origin, direction, inside.begin_m, inside.end_m, map_->brick_edge_m(), visit_brick);
   return verdict;
 }
 

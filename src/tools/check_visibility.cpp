@@ -151,14 +151,15 @@ nlohmann::json score(const Result& result, const std::vector<Row>& rows, double 
            {{"rows", labelled.total()}, {"agreement", labelled.agreement()}, {"confusion", labelled.to_json()}}}};
 }
 
-/// Algorithm 2 at the cloud's resolution: one neighbour within a radius, fixed or growing with the range, that at these
-/// steps leaves no hole between four samples of a square grid.
+/// Algorithm 2 at the cloud's resolution: one neighbour within a radius, fixed or growing with the range. That of the
+/// circle about a triangle of neighbouring samples is where its two errors balance: a larger one widens the rim at
+/// every edge, a smaller one lets rays through between the samples.
 std::unique_ptr<RayTracer> make_kd_tree(const PointCloud& cloud, double spacing_m, const Options& options, bool grows) {
   KdTreeRayTracerParameters parameters;
   parameters.min_range = options.min_range_m;
   parameters.max_range = options.max_range_m;
   parameters.range_step = 0.5 * spacing_m;
-  parameters.search_radius = 0.75 * spacing_m;
+  parameters.search_radius = spacing_m / std::sqrt(3.0);
   parameters.search_radius_slope = grows ? 0.02 : 0.0;
   parameters.search_radius_max = grows ? 2.0 * spacing_m : parameters.search_radius;
   return std::make_unique<KdTreeRayTracer>(cloud, parameters);

@@ -109,6 +109,7 @@ bool pierces_any(const PointCloud& points, const Eigen::Vector3d& origin, const 
         corners << near[i], near[j], near[k];
         const Eigen::Vector3d weights = corners.fullPivLu().solve(direction);
         if (!weights.allFinite() || weights.minCoeff() < 0.0) continue;
+        if (!(corners * weights).isApprox(direction, 1e-9)) continue;  // three points in line
         const double range_m = 1.0 / weights.sum();
         bool is_within_depth = true;
         for (const std::size_t corner : {i, j, k}) {
@@ -151,6 +152,45 @@ TEST(VoxelRayTracer, AgreesWithTryingAllTriangles) {
   }
   EXPECT_GT(blocked, 150);
   EXPECT_LT(blocked, 1000);
+}
+
+TEST(VoxelRayTracer, SkippingEmptySpaceSkipsNoWall) {
+  // Small far-apart walls about the origin, where coordinates change sign, with empty bricks between them.
+  RandomEngine engine = make_engine(21);
+  std::vector<Rectangle> walls;
+  for (int i = 0; i < 60; ++i) {
+    const double yaw = 2.0 * M_PI * draw_uniform(engine);
+    const Eigen::Vector2d along(std::cos(yaw), std::sin(yaw));
+    const Eigen::Vector2d middle(-150.0 + 300.0 * draw_uniform(engine), -150.0 + 300.0 * draw_uniform(engine));
+    const double foot_m = -60.0 + 100.0 * draw_uniform(engine);
+    walls.push_back(wall(middle - 5.0 * along, middle + 5.0 * along, foot_m, foot_m + 8.0));
+  }
+  const VoxelMap map = map_of(sampled(walls, 0.7), 0.5);
+  const PointCloud points = map.points();
+  const VoxelRayTracer tracer(map, {});
+  const double link_m = 3.2 * 0.5;
+  const double reach_m = link_m / std::sqrt(3.0);
+  int blocked = 0;
+  for (int ray = 0; ray < 400; ++ray) {
+    const Eigen::Vector3d origin(-20.0 + 40.0 * draw_uniform(engine), -20.0 + 40.0 * draw_uniform(engine),
+                                 -20.0 + 40.0 * draw_uniform(engine));
+    // Half of them near a point of a wall, some along the axes of the grid, on which faces are met edge on.
+    const auto target = static_cast<std::size_t>(draw_uniform(engine) * static_cast<double>(points.size()));
+    const Eigen::Vector3d beside(draw_uniform(engine) - 0.5, draw_uniform(engine) - 0.5, draw_uniform(engine) - 0.5);
+    const Eigen::Vector3d axis = Eigen::Vector3d::Unit(ray % 3) * (ray % 4 < 2 ? 1.0 : -1.0);
+    const Eigen::Vector3d direction = ray % 8 == 0   ? axis
+                                      : ray % 2 == 0 ? draw_sky_direction(engine, -0.5)
+                                                     : (points[target].cast<double>() + beside - origin).normalized();
+    const bool verdict = tracer.trace(origin, direction).blocked;
+    blocked += verdict ? 1 : 0;
+    if (verdict) {
+      EXPECT_TRUE(pierces_any(points, origin, direction, link_m + 1e-3, reach_m + 1e-3, kInfinity)) << ray;
+    } else {
+      EXPECT_FALSE(pierces_any(points, origin, direction, link_m - 1e-3, reach_m - 1e-3, reach_m - 1e-3)) << ray;
+    }
+  }
+  EXPECT_GT(blocked, 100);
+  EXPECT_LT(blocked, 300);
 }
 
 TEST(VoxelRayTracer, NeitherSinglePointsNorPolesBlock) {

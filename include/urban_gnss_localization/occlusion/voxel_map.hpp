@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -48,14 +49,16 @@ struct InsertReport {
 /// many of the followed rays ended there or passed it by. What was seen earlier stays until it is farther than the
 /// window.
 ///
-/// A hash table finds cells of kCellVoxels a side, which is what a ray walks along. A cell has a mask of its voxels,
-/// one bit each, and keeps them side by side in the order of the bits, so that they are read together. Each byte of the
-/// mask is one octant of the cell, two voxels a side.
+/// A tree of two levels: a hash table finds bricks of kBrickCells cells a side, and a cell has kCellVoxels voxels a
+/// side. A brick has a mask of the cells that hold a voxel or have a neighbour that does, one bit each, so that a ray
+/// crosses empty space by bricks that are not there, and by bits that are not set. A cell has a mask of its voxels, and
+/// keeps them side by side in the order of the bits, so that they are read together.
 class VoxelMap {
  public:
   using Index = KeyIndex::Index;
   static constexpr Index kNone = KeyIndex::kNone;
   static constexpr int kCellVoxels = 4;
+  static constexpr int kBrickCells = 4;
 
   /// Throws ParameterError.
   explicit VoxelMap(const VoxelMapParameters& parameters);
@@ -89,22 +92,63 @@ class VoxelMap {
   double permeability(Index voxel) const { return surface_[voxel].permeability; }
 
   double cell_edge_m() const { return cell_edge_m_; }
-  /// The cell of these coordinates, kNone where neither it nor one of its 26 neighbours holds a voxel.
-  Index find_cell(const VoxelCoordinates& cell) const { return cell_index_.find(voxel_key(cell)); }
-  /// Whether the neighbour at these offsets, each -1, 0 or 1 (0, 0, 0 is the cell itself), holds a voxel.
-  bool is_occupied_nearby(Index cell, int dx, int dy, int dz) const {
-    return (cells_[cell].nearby & nearby_bit(dx, dy, dz)) != 0;
+  double brick_edge_m() const { return kBrickCells * cell_edge_m_; }
+  /// The brick of these coordinates, kNone where there is nothing in or beside it.
+  Index find_brick(const VoxelCoordinates& brick) const { return brick_index_.find(voxel_key(brick)); }
+  /// The cell of these coordinates in the brick that holds it, kNone where neither it nor one of its 26 neighbours
+  /// holds a voxel.
+  Index find_cell(Index brick, const VoxelCoordinates& cell) const {
+    const Index place = place_of(cell);
+    return (near_[brick] >> place & 1U) != 0 ? kPlaces * brick + place : kNone;
   }
-  /// Calls visit(octant, begin, end) for each octant of a cell that holds voxels: those from begin up to end. Bit 0 of
-  /// `octant` is set in the upper half of x, bit 1 of y, bit 2 of z.
+  Index find_cell(const VoxelCoordinates& cell) const {
+    const Index brick = find_brick(brick_of(cell));
+    return brick == kNone ? kNone : find_cell(brick, cell);
+  }
+  static VoxelCoordinates cell_of(const VoxelCoordinates& voxel) { return brick_of(voxel); }
+  static VoxelCoordinates brick_of(const VoxelCoordinates& cell) {
+    return {cell.x() >> 2, cell.y() >> 2, cell.z() >> 2};  // rounds down below zero, too
+  }
+  /// Calls visit(voxel) for each voxel with coordinates from `low` to `high` (both included) in this cell and its 26
+  /// neighbours. Cells are picked by a mask of those that hold something, voxels by masks of the slabs of the box.
   template <class Visit>
-  void for_each_octant(Index cell, Visit&& visit) const {
-    Index begin = cells_[cell].begin;
-    std::uint64_t mask = cells_[cell].mask;
-    for (int octant = 0; mask != 0; ++octant, mask >>= 8U) {
-      const auto count = static_cast<Index>(__builtin_popcountll(mask & 0xFFU));
-      if (count > 0) visit(octant, begin, begin + count);
-      begin += count;
+  void for_each_nearby_voxel(Index index, const VoxelCoordinates& cell, const VoxelCoordinates& low,
+                             const VoxelCoordinates& high, Visit&& visit) const {
+    const std::uint32_t nearby = nearby_[index];
+    const Index brick = index / kPlaces;
+    const VoxelCoordinates brick_coordinates = brick_of(cell);
+    const VoxelCoordinates first = (cell_of(low)).cwiseMax((cell.array() - 1).matrix());
+    const VoxelCoordinates last = (cell_of(high)).cwiseMin((cell.array() + 1).matrix());
+    struct Found {
+      Index begin;
+      std::uint64_t mask;
+      std::uint64_t inside;
+    };
+    std::array<Found, 27> found;  // so that the memory is asked for all of it before any is waited for
+    std::size_t count = 0;
+    VoxelCoordinates at;
+    for (at.x() = first.x(); at.x() <= last.x(); ++at.x()) {
+      const std::uint64_t in_x = slab(0, at, low, high);
+      for (at.y() = first.y(); at.y() <= last.y(); ++at.y()) {
+        const std::uint64_t in_xy = in_x & slab(1, at, low, high);
+        for (at.z() = first.z(); at.z() <= last.z(); ++at.z()) {
+          if ((nearby & nearby_bit(at.x() - cell.x(), at.y() - cell.y(), at.z() - cell.z())) == 0) continue;
+          const VoxelCoordinates other = brick_of(at);
+          const Index index_of_other =
+              kPlaces * (other == brick_coordinates ? brick : find_brick(other)) + place_of(at);
+          const std::uint64_t mask = masks_[index_of_other];
+          const std::uint64_t inside = mask & in_xy & slab(2, at, low, high);
+          if (inside == 0) continue;
+          const Index begin = blocks_[index_of_other].begin;
+          __builtin_prefetch(&surface_[begin + rank(mask, inside & (~inside + 1))]);
+          found[count++] = {begin, mask, inside};
+        }
+      }
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+      for (std::uint64_t rest = found[i].inside; rest != 0; rest &= rest - 1) {
+        visit(found[i].begin + rank(found[i].mask, rest & (~rest + 1)));
+      }
     }
   }
 
@@ -112,9 +156,8 @@ class VoxelMap {
   static constexpr std::uint32_t kMinEvidence = 5;
   static constexpr std::size_t kSizeClasses = 5;  ///< room for 4, 8, 16, 32 or all 64 voxels of a cell
 
-  struct Cell {
-    std::uint64_t mask{0};    ///< of its voxels
-    std::uint32_t nearby{0};  ///< which of the 27 cells about it hold voxels
+  /// Where a cell's voxels are.
+  struct Block {
     Index begin{0};
     std::uint8_t count{0};
     std::uint8_t size_class{0};  ///< only where count > 0
@@ -133,12 +176,52 @@ class VoxelMap {
   static std::uint32_t nearby_bit(int dx, int dy, int dz) {
     return 1U << static_cast<unsigned>(9 * (dx + 1) + 3 * (dy + 1) + dz + 1);
   }
+  static constexpr Index kPlaces = 64;  ///< of cells in a brick
+  /// The place of a cell in its brick, and of a voxel in its cell: octant by octant, so that neighbours are close.
+  static Index place_of(const VoxelCoordinates& at) {
+    const int place = (at.x() & 1) | (at.y() & 1) << 1 | (at.z() & 1) << 2 |  //
+                      (at.x() & 2) << 2 | (at.y() & 2) << 3 | (at.z() & 2) << 4;
+    return static_cast<Index>(place);
+  }
+  static std::uint64_t bit_of(const VoxelCoordinates& voxel) { return std::uint64_t{1} << place_of(voxel); }
+  /// The coordinates in the brick, or in the cell, of this place.
+  static VoxelCoordinates at_place(Index place) {
+    const auto bits = [place](unsigned axis) {
+      return static_cast<int>((place >> axis & 1U) | (place >> axis >> 2U & 2U));
+    };
+    return {bits(0), bits(1), bits(2)};
+  }
+  /// How many of a cell's voxels come before this one: the number of bits below it, in the registers of any machine.
+  static Index rank(std::uint64_t mask, std::uint64_t bit) {
+    std::uint64_t below = mask & (bit - 1);
+    below -= below >> 1U & 0x5555555555555555U;
+    below = (below & 0x3333333333333333U) + (below >> 2U & 0x3333333333333333U);
+    below = (below + (below >> 4U)) & 0x0F0F0F0F0F0F0F0FU;
+    return static_cast<Index>(below * 0x0101010101010101U >> 56U);
+  }
+  /// For each axis the bits of a cell's voxels from the first, second, third or fourth on, or of none.
+  static constexpr std::array<std::array<std::uint64_t, kCellVoxels + 1>, 3> kFrom{{
+      {~0ULL, 0xFFAAFFAAFFAAFFAAU, 0xFF00FF00FF00FF00U, 0xAA00AA00AA00AA00U, 0U},
+      {~0ULL, 0xFFFFCCCCFFFFCCCCU, 0xFFFF0000FFFF0000U, 0xCCCC0000CCCC0000U, 0U},
+      {~0ULL, 0xFFFFFFFFF0F0F0F0U, 0xFFFFFFFF00000000U, 0xF0F0F0F000000000U, 0U},
+  }};
+  /// The bits of this cell's voxels that are from `low` to `high` along one axis.
+  static std::uint64_t slab(std::size_t axis, const VoxelCoordinates& cell, const VoxelCoordinates& low,
+                            const VoxelCoordinates& high) {
+    const auto place = static_cast<Eigen::Index>(axis);
+    const int corner = kCellVoxels * cell[place];
+    const auto from = [&](int voxel) {
+      return kFrom[axis][static_cast<std::size_t>(std::min(std::max(voxel - corner, 0), kCellVoxels))];
+    };
+    return from(low[place]) & ~from(high[place] + 1);
+  }
   static Index room(std::size_t size_class) { return Index{4} << size_class; }
 
   void add_point(const Eigen::Vector3f& point, InsertReport& report);
   void follow_ray(const Eigen::Vector3d& sensor, const Eigen::Vector3d& end);
   void count_meeting(Index voxel, std::uint32_t Counts::*kind);
   Index find_voxel(const VoxelCoordinates& voxel) const;
+  Index find_or_add_brick(const VoxelCoordinates& brick);
   Index occupy(const VoxelCoordinates& cell);
   void release(const VoxelCoordinates& cell);
   Index take_block(std::size_t size_class);
@@ -153,9 +236,13 @@ class VoxelMap {
   double cell_edge_m_;
   float farthest_m_;
   std::size_t size_{0};
-  KeyIndex cell_index_;
-  std::vector<Cell> cells_;
-  std::vector<Index> unused_cells_;
+  KeyIndex brick_index_;
+  std::vector<std::uint64_t> near_;  ///< each brick's mask of its cells with something in or beside them
+  // The cells, kPlaces to a brick, by what is read together; those of an unused brick are all empty.
+  std::vector<std::uint32_t> nearby_;  ///< which of the 27 cells about each hold voxels
+  std::vector<std::uint64_t> masks_;   ///< of the voxels of each
+  std::vector<Block> blocks_;
+  std::vector<Index> unused_bricks_;
   std::vector<Surface> surface_;  ///< what a tracer reads
   std::vector<Counts> counts_;    ///< beside it
   std::array<std::vector<Index>, kSizeClasses> unused_blocks_;
