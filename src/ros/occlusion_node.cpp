@@ -45,7 +45,8 @@ OcclusionNode::OcclusionNode(ros::NodeHandle& node, ros::NodeHandle& private_nod
   fix_subscriber_ = node.subscribe(topics::kFix, 100, &OcclusionNode::on_fix, this, no_delay);
   fix_watch_.set_subscriber(fix_subscriber_);
   satellites_subscriber_ = node.subscribe(topics::kSatellites, 100, &OcclusionNode::on_satellites, this, no_delay);
-  cloud_subscriber_ = node.subscribe(topics::kPoints, 10, &OcclusionNode::on_cloud, this, no_delay);
+  // A longer queue than cloud_queue: what is dropped is dropped in on_cloud(), which counts it.
+  cloud_subscriber_ = node.subscribe(topics::kPoints, 100, &OcclusionNode::on_cloud, this, no_delay);
   estimate_subscriber_ = node.subscribe(topics::kEstimate, 100, &OcclusionNode::on_estimate, this, no_delay);
   clear_service_ = private_node.advertiseService("clear_map", &OcclusionNode::clear_map, this);
   save_service_ = private_node.advertiseService("save_map", &OcclusionNode::save_map, this);
@@ -80,6 +81,8 @@ std::optional<Eigen::Isometry3d> OcclusionNode::transform(const std::string& to,
   return found ? std::optional<Eigen::Isometry3d>(to_isometry(found->transform)) : std::nullopt;
 }
 
+/// Only queues the cloud, for the timer or the next fix: who works here leaves the next clouds to ROS's own queue,
+/// which drops them without a word.
 void OcclusionNode::on_cloud(const sensor_msgs::PointCloud2ConstPtr& message) {
   clouds_.push_back(message);
   ++clouds_received_;
@@ -88,10 +91,9 @@ void OcclusionNode::on_cloud(const sensor_msgs::PointCloud2ConstPtr& message) {
     ++clouds_dropped_;
     ROS_WARN_STREAM_THROTTLE(5.0, clouds_dropped_ << " of " << clouds_received_
                                                   << " clouds dropped: they come faster than they go into the map, "
-                                                     "or tf does not follow; last: "
-                                                  << tf_fault_);
+                                                     "or tf does not follow: "
+                                                  << (tf_fault_.empty() ? "no fault of tf" : tf_fault_));
   }
-  work();
 }
 
 void OcclusionNode::on_satellites(const urban_gnss_localization::SatelliteArray& message) {
@@ -138,7 +140,7 @@ bool OcclusionNode::is_overdue(const ros::Time& stamp) const {
 
 void OcclusionNode::work() {
   update_alignment();
-  while (!clouds_.empty() && insert(*clouds_.front())) clouds_.pop_front();
+  if (!clouds_.empty() && insert(*clouds_.front())) clouds_.pop_front();  // one, then what has come meanwhile
   while (!fixes_.empty() && assess(fixes_.front())) fixes_.pop_front();
 }
 

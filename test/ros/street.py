@@ -116,6 +116,11 @@ class Street:
                                         for store in stores.values()), "the fix at %d" % due)
         return stamps[:-lag]
 
+    def burst(self, clouds, points):
+        """Clouds of one moment, without anything else."""
+        for i in range(clouds):
+            self.publishers["points"].publish(to_cloud(rospy.Time.from_sec(self.time_s + 0.01 + 1e-4 * i), points))
+
     @staticmethod
     def _satellites(stamp):
         message = SatelliteArray()

@@ -22,6 +22,7 @@ NODE, NODELET, TURNED, LOST = "", "/nodelet", "/turned", "/lost"
 NODES = (NODE, NODELET, TURNED, LOST)
 WALL = wall(10.0)
 MANY = 20  # epochs
+CLOUD_QUEUE = 5  # the node's default
 
 
 def numbers(message):
@@ -214,7 +215,19 @@ class StreetTest(unittest.TestCase):
         self.feed_complete()
         self.wait_for_status("/occlusion", "weighing by lidar_and_satellites")
 
-    def test_09_a_bag_that_starts_over(self):
+    def test_09_clouds_that_are_dropped_are_counted_and_reported(self):
+        self.feed_complete()
+        before = self.count("/occlusion", "clouds dropped")
+        self.street.burst(25, WALL)  # their transform never comes
+        self.wait_for(lambda: self.count("/occlusion", "clouds dropped") == before + 25 - CLOUD_QUEUE, "no count")
+        self.wait_for_log("/occlusion", "clouds dropped: they come faster than they go into the map")
+        self.feed_complete()
+
+    def count(self, node, key):
+        values = self.statuses[node[1:] + ": occlusion"].values
+        return int(next(value.value for value in values if value.key == key))
+
+    def test_10_a_bag_that_starts_over(self):
         self.feed_complete()
         both = self.feed(cloud=WALL + wall(-10.0))[NODE]
         self.assertEqual({svid for svid, s in by_svid(both).items() if s.blocked_fraction > 0.99}, {*NORTH, *SOUTH})
