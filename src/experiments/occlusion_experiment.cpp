@@ -52,7 +52,7 @@ struct Epoch {
   std::vector<bool> has_line_of_sight;  ///< truth, of each satellite
 };
 
-/// A model's pipeline with the filter that uses its covariances.
+/// A model's pipeline with the filters that use its covariances.
 class Contestant {
  public:
   Contestant(CovarianceModel model, const Scenario& scenario, OcclusionExperimentConditions conditions,
@@ -65,18 +65,24 @@ class Contestant {
     occlusion_ = std::make_unique<OcclusionPipeline>(conditions.occlusion);
     const Eigen::Vector3d antenna = scenario.vehicle.antenna();
     occlusion_->set_antenna(antenna);
-    localization_ = std::make_unique<LocalizationPipeline>(conditions.localization,
-                                                           std::make_unique<Ukf>(conditions.ukf, conditions.motion));
-    localization_->set_antenna_offset(antenna.head<2>());
-    localization_->set_datum(scenario.datum);
+    UkfParameters robust = conditions.ukf;
+    robust.outliers = OutlierPolicy::kStudentT;
+    localization_ = make_localization(scenario, conditions, conditions.ukf);
+    robust_localization_ = make_localization(scenario, conditions, robust);
   }
 
-  /// The first map -> odom of the filter.
-  const std::optional<TimedPose>& start() const { return start_; }
+  /// When the filter gave its first estimate.
+  const std::optional<Stamp>& start() const { return start_; }
 
   void add_odometry(const OdometrySample& sample) {
-    localization_->add_odometry(sample);
+    for (const auto& each : {localization_.get(), robust_localization_.get()}) each->add_odometry(sample);
     take_outputs();
+  }
+
+  void add_yaw_rate(Stamp stamp, double yaw_rate_radps) {
+    for (const auto& each : {localization_.get(), robust_localization_.get()}) {
+      each->add_imu_yaw_rate(stamp, yaw_rate_radps);
+    }
   }
 
   void add_cloud(Stamp stamp, const PointCloud& cloud, const Eigen::Isometry3d& sensor_in_base,
@@ -90,8 +96,8 @@ class Contestant {
     const Eigen::Matrix2d claimed = epoch.fix->covariance.topLeftCorner<2, 2>();
     const FixAssessment assessment = occlusion_->assess(epoch.stamp, claimed, to_isometry(base_in_odom));
     const GnssCovariance& covariance = assessment.covariance;
-    run_.fixes.push_back(
-        {epoch.stamp, epoch.error_m, claimed, covariance.weighted, covariance.is_good, assessment.has_map});
+    run_.fixes.push_back({epoch.stamp, epoch.fix->position.head<2>(), epoch.error_m, claimed, covariance.weighted,
+                          covariance.is_good, assessment.has_map});
     if (assessment.has_map) tally(assessment, epoch.has_line_of_sight);
 
     RawFix fix;
@@ -100,21 +106,36 @@ class Contestant {
     fix.covariance = epoch.fix->covariance;
     fix.covariance.topLeftCorner<2, 2>() = covariance.weighted;
     fix.covariance_type = CovarianceType::kKnown;
-    localization_->add_fix(fix);
+    for (const auto& each : {localization_.get(), robust_localization_.get()}) each->add_fix(fix);
     take_outputs();
   }
 
  private:
+  static std::unique_ptr<LocalizationPipeline> make_localization(const Scenario& scenario,
+                                                                 const OcclusionExperimentConditions& conditions,
+                                                                 const UkfParameters& ukf) {
+    auto localization =
+        std::make_unique<LocalizationPipeline>(conditions.localization, std::make_unique<Ukf>(ukf, conditions.motion));
+    localization->set_antenna_offset(scenario.vehicle.antenna().head<2>());
+    localization->set_datum(scenario.datum);
+    return localization;
+  }
+
   void take_outputs() {
     for (const LocalizationOutput& output : localization_->take_outputs()) {
       const Pose2 odom_in_map = map_to_odometry(output);
-      if (!start_) start_ = TimedPose{output.stamp, odom_in_map};
+      if (!start_) start_ = output.stamp;
       run_.estimate.push_back({output.stamp, output.estimate.pose, output.estimate.covariance});
       occlusion_->set_alignment(
           {output.stamp, odom_in_map, std::sqrt(std::max(0.0, output.estimate.covariance(2, 2)))});
     }
-    localization_->take_events();
-    localization_->take_verdicts();
+    for (const LocalizationOutput& output : robust_localization_->take_outputs()) {
+      run_.robust_estimate.push_back({output.stamp, output.estimate.pose, output.estimate.covariance});
+    }
+    for (const auto& each : {localization_.get(), robust_localization_.get()}) {
+      each->take_events();
+      each->take_verdicts();
+    }
   }
 
   void tally(const FixAssessment& assessment, const std::vector<bool>& has_line_of_sight) {
@@ -133,7 +154,8 @@ class Contestant {
   OcclusionModelRun& run_;
   std::unique_ptr<OcclusionPipeline> occlusion_;
   std::unique_ptr<LocalizationPipeline> localization_;
-  std::optional<TimedPose> start_;
+  std::unique_ptr<LocalizationPipeline> robust_localization_;
+  std::optional<Stamp> start_;
 };
 
 /// Sorts the simulator's events, and holds back clouds and epochs until odometry has reached them.
@@ -159,8 +181,12 @@ class Experiment {
   void finish() {
     const auto& start = contestants_.front()->start();
     if (!start) return;
+    const auto truth = interpolate(run_.truth, *start, kOdometryGap);
+    const auto odometry = interpolate(odometry_, *start, kOdometryGap);
+    if (!truth || !odometry) return;
+    const Pose2 odom_in_map = compose(truth->pose, inverse(odometry->pose));
     for (const TimedPose& pose : odometry_) {
-      if (pose.stamp >= start->stamp) run_.odometry.push_back({pose.stamp, compose(start->pose, pose.pose)});
+      if (pose.stamp >= *start) run_.odometry.push_back({pose.stamp, compose(odom_in_map, pose.pose)});
     }
   }
 
@@ -170,7 +196,9 @@ class Experiment {
     odometry_.push_back({stamp_, odometry.pose});
     for (const auto& contestant : contestants_) contestant->add_odometry({stamp_, odometry.pose, odometry.twist});
   }
-  void add(const ImuMessage&) {}
+  void add(const ImuMessage& imu) {
+    for (const auto& contestant : contestants_) contestant->add_yaw_rate(stamp_, imu.angular_velocity_radps.z());
+  }
   void add(const LidarScan& scan) {
     if (scans_++ % cloud_every_ == 0) clouds_.emplace_back(stamp_, to_point_cloud(scan));
   }

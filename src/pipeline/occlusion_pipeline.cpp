@@ -181,7 +181,7 @@ FixAssessment OcclusionPipeline::assess(Stamp stamp, const std::optional<Eigen::
     }
     if (!has_satellites) sky = observe_sky(*antenna);
   }
-  assessment.covariance = covariance_.process(assessment.satellites, sky, claimed);
+  assessment.covariance = covariance_.process(stamp, assessment.satellites, sky, claimed);
   return assessment;
 }
 
