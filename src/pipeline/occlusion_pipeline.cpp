@@ -59,6 +59,7 @@ OcclusionPipeline::OcclusionPipeline(const OcclusionPipelineParameters& paramete
     : parameters_(parameters),
       local_map_(parameters.local_map, parameters.voxels, parameters.aligner),
       voxel_tracer_(local_map_.map(), parameters.voxel_tracer),
+      sampling_(parameters.visibility),
       covariance_(parameters.covariance),
       antenna_in_base_(parameters.occlusion.antenna_offset[0], parameters.occlusion.antenna_offset[1],
                        parameters.occlusion.antenna_offset[2]) {}
@@ -175,7 +176,7 @@ FixAssessment OcclusionPipeline::assess(Stamp stamp, const std::optional<Eigen::
       SatelliteObservation& satellite = assessment.satellites[i];
       if (!has_direction(satellite)) continue;
       assessment.visibilities[i] = assess_visibility(tracer(), local_map_.map().observed_space(), *antenna,
-                                                     satellite.look, angle_resolution_rad_, parameters_.visibility);
+                                                     satellite.look, angle_resolution_rad_, sampling_);
       satellite.blocked_fraction = assessment.visibilities[i].blocked_fraction;
       satellite.known_fraction = assessment.visibilities[i].known_fraction;
     }

@@ -104,13 +104,12 @@ nlohmann::json classification_json(const std::vector<OcclusionRun>& runs, std::s
 }
 
 /// Share of satellites of which the map says the truth, by whether they have a line of sight.
-nlohmann::json satellites_json(const std::vector<OcclusionRun>& runs, std::size_t model) {
+nlohmann::json satellites_json(const std::vector<OcclusionRun>& runs) {
   LineOfSightTally all;
   for (const OcclusionRun& run : runs) {
     for (const std::size_t truth : {0U, 1U}) {
-      for (const std::size_t said : {0U, 1U})
-        all.counts[truth][said] += run.models[model].satellites.counts[truth][said];
-      all.known_sum[truth] += run.models[model].satellites.known_sum[truth];
+      for (const std::size_t said : {0U, 1U}) all.counts[truth][said] += run.satellites.counts[truth][said];
+      all.known_sum[truth] += run.satellites.known_sum[truth];
     }
   }
   const auto direct = static_cast<double>(all.count(true));
@@ -192,8 +191,8 @@ nlohmann::json scenario_json(const std::vector<OcclusionRun>& runs) {
         runs, [i](const OcclusionRun& run) -> const Trajectory& { return run.models[i].robust_estimate; });
     if (kComparedModels[i] == CovarianceModel::kConventional) continue;
     json["classification"][name] = classification_json(runs, i);
-    json["satellites"][name] = satellites_json(runs, i);
   }
+  json["satellites"] = satellites_json(runs);
   return json;
 }
 
@@ -213,7 +212,7 @@ void print(const std::string& scenario, const nlohmann::json& json) {
                "satellites: direct>free  hidden>blocked  known direct/hidden\n";
   for (const char* name : {"paper", "soft"}) {
     const auto& c = json["classification"][name];
-    const auto& s = json["satellites"][name];
+    const auto& s = json["satellites"];
     std::cout << std::left << std::setw(13) << name << std::right << std::setw(7) << text_of(c["correct"], 100, 1)
               << " %" << std::setw(7) << text_of(c["correct_of_good"], 100, 1) << " %" << std::setw(6)
               << text_of(c["correct_of_bad"], 100, 1) << " %";

@@ -60,20 +60,20 @@ struct OcclusionModelRun {
   std::vector<WeighedFix> fixes;
   Trajectory estimate;
   Trajectory robust_estimate;  ///< by the same filter with OutlierPolicy::kStudentT
-  LineOfSightTally satellites;
 };
 
 /// One drive through a scenario, every model on the same measurements. All in the scenario's map frame.
 struct OcclusionRun {
   Trajectory truth;
   Trajectory odometry;  ///< alone, from the true pose when the conventional model's filter started
+  LineOfSightTally satellites;
   std::array<OcclusionModelRun, kComparedModels.size()> models;
 };
 
-/// Drives the scenario; for each model, an OcclusionPipeline weighs the fixes and a UKF uses them, whose heading turns
-/// that pipeline's sky; a robust one stands beside it. Nothing but the results sees the truth: the filters start from
-/// fixes and motion. The conventional model makes no use of a map and is given no clouds. `on_progress` is told the
-/// share done, 0 to 1. Throws what CitySimulator throws.
+/// Drives the scenario: an OcclusionPipeline builds the map and says which satellites it hides, each model weighs the
+/// fixes by that, and a UKF and a robust one use its covariances. The soft model's UKF turns the sky for all. Nothing
+/// but the results sees the truth: the filters start from fixes and motion. `on_progress` is told the share done, 0
+/// to 1. Throws what CitySimulator throws.
 OcclusionRun run_occlusion_experiment(const Scenario& scenario, const OcclusionExperimentConditions& conditions,
                                       const std::function<void(double)>& on_progress);
 
