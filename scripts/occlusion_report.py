@@ -148,7 +148,7 @@ def map_panels(scenarios):
     for axes in grid.ravel()[len(scenarios):]:
         axes.set_axis_off()
     for axes, scenario in zip(grid.ravel(), scenarios):
-        axes.set_aspect("equal", adjustable="datalim")
+        axes.set_aspect("equal")
         axes.set_title(scenario, fontsize=10, loc="left")
         axes.set_xlabel("east [m]")
         axes.set_ylabel("north [m]")
