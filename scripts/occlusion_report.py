@@ -52,9 +52,16 @@ def cell(content, *keys, scale=1.0, digits=2):
     return common.format_number(scale * common.number(content, *keys), digits)
 
 
+def percent(share):
+    """A share for a table; an en dash when there is none."""
+    return "{:.1f} %".format(100.0 * share) if np.isfinite(share) else "–"
+
+
 def spread(content, name, scale=1.0, digits=2):
-    """Mean and standard deviation as text."""
+    """Mean and standard deviation as text; empty where there are none."""
     unit = "_rad" if name == "heading" else "_m"
+    if not np.isfinite(common.number(content, name + "_mean" + unit)):
+        return ""
     return " ± ".join(cell(content, name + which + unit, scale=scale, digits=digits) for which in ("_mean", "_sigma"))
 
 
@@ -75,10 +82,10 @@ def table_1(scenarios):
             counts = [common.number(c, key) for key in ("good_called_good", "good_called_bad", "bad_called_good",
                                                         "bad_called_bad")]
             good, bad = counts[0] + counts[1], counts[2] + counts[3]
-            shares = [common.format_number(100.0 * count / whole if whole else np.nan, 1) + " %"
+            shares = [percent(count / whole if whole else np.nan)
                       for count, whole in zip(counts, (good, good, bad, bad))]
             rows.append(["{}, {}".format(scenario, model), "{:.0f}".format(good + bad),
-                         cell(c, "correct", scale=100.0, digits=1) + " %"] + shares)
+                         percent(common.number(c, "correct"))] + shares)
     return header, rows
 
 
@@ -200,8 +207,10 @@ def make_report(out):
     truths = {s: trajectory(s, "truth") for s in scenarios}
     estimates = {s: {model: trajectory(s, model) for model in MODELS} for s in scenarios}
     plot_figure5(os.path.join(out, "fig5.png"), fixes)
-    plot_figure6(os.path.join(out, "fig6.png"), fixes, truths)
-    plot_figure7(os.path.join(out, "fig7.png"), truths, estimates)
+    # A map without a bad fix shows nothing.
+    shown = [s for s in scenarios if np.any(fixes[s]["error"] > BAD_FIX_M)] or list(scenarios)
+    plot_figure6(os.path.join(out, "fig6.png"), {s: fixes[s] for s in shown}, truths)
+    plot_figure7(os.path.join(out, "fig7.png"), {s: truths[s] for s in shown}, estimates)
 
     seeds = metrics.get("seeds", [])
     tables = (("Table I: good and bad fixes, told apart at {:g} m".format(BAD_FIX_M), table_1(scenarios)),
