@@ -7,8 +7,8 @@ namespace urban_gnss {
 
 Eigen::Matrix2d ReceiverMemory::add(Stamp stamp, const Eigen::Vector2d& mean, const Eigen::Matrix2d& covariance) {
   const double interval_s = last_ ? to_seconds(stamp - *last_) : -1.0;
-  const bool goes_on = interval_s >= 0.0 && interval_s <= parameters_.receiver_coasting_time &&
-                       parameters_.receiver_smoothing_time > 0.0;
+  const bool goes_on =
+      interval_s > 0.0 && interval_s <= parameters_.receiver_coasting_time && parameters_.receiver_smoothing_time > 0.0;
   const double kept = goes_on ? std::exp(-interval_s / parameters_.receiver_smoothing_time) : 0.0;
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(covariance);
   const Eigen::Matrix2d root =

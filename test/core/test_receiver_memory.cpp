@@ -89,6 +89,8 @@ TEST(ReceiverMemory, StartsAnewAfterAGapAStampOfThePastAndAReset) {
   memory.add(seconds(18.0), kNone, bad);
   EXPECT_TRUE(memory.add(seconds(17.9), kNone, good).isApprox(good, 1e-12));
   memory.add(seconds(18.0), kNone, bad);
+  EXPECT_TRUE(memory.add(seconds(18.0), kNone, good).isApprox(good, 1e-12));
+  memory.add(seconds(18.05), kNone, bad);
   memory.reset();
   EXPECT_TRUE(memory.add(seconds(18.1), kNone, good).isApprox(good, 1e-12));
 }

@@ -37,7 +37,7 @@ class ReceiverMemory {
 
   /// Second moment of the error of the fix at `stamp`, m^2, whose solution alone has this mean error (m) and covariance
   /// (m^2, positive semidefinite). Starts anew after receiver_coasting_time without a solution, and where the stamp is
-  /// older than the last.
+  /// not newer than the last.
   Eigen::Matrix2d add(Stamp stamp, const Eigen::Vector2d& mean, const Eigen::Matrix2d& covariance);
 
   void reset() { last_.reset(); }
