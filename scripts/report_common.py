@@ -36,6 +36,7 @@ METHOD_COLOURS = {
     "ekf": "#e69f00",
     "dead_reckoning": "#8a8a8a",
     "oracle": "#7b4fd6",
+    "soft": "#117733",
 }
 OTHER_COLOURS = ("#f781bf", "#7f9c00", "#1f3a93", "#17becf", "#843c39", "#c49c00", "#3b7a57", "#b39ddb",
                  "#ff7f0e")

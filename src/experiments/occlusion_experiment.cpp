@@ -1,6 +1,7 @@
 #include "urban_gnss_localization/experiments/occlusion_experiment.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <deque>
 #include <memory>
@@ -52,88 +53,80 @@ struct Epoch {
   std::vector<bool> has_line_of_sight;  ///< truth, of each satellite
 };
 
-/// A model's pipeline with the filter that uses its covariances.
+/// A covariance model with the filters that use its covariances.
 class Contestant {
  public:
-  Contestant(CovarianceModel model, const Scenario& scenario, OcclusionExperimentConditions conditions,
+  Contestant(CovarianceModel model, const Scenario& scenario, const OcclusionExperimentConditions& conditions,
              OcclusionModelRun& run)
-      : frame_(scenario.datum),
-        blocked_threshold_(conditions.occlusion.covariance.blocked_threshold),
-        wants_clouds_(model != CovarianceModel::kConventional),
-        run_(run) {
-    conditions.occlusion.covariance.model = model;
-    occlusion_ = std::make_unique<OcclusionPipeline>(conditions.occlusion);
-    const Eigen::Vector3d antenna = scenario.vehicle.antenna();
-    occlusion_->set_antenna(antenna);
-    localization_ = std::make_unique<LocalizationPipeline>(conditions.localization,
-                                                           std::make_unique<Ukf>(conditions.ukf, conditions.motion));
-    localization_->set_antenna_offset(antenna.head<2>());
-    localization_->set_datum(scenario.datum);
+      : frame_(scenario.datum), covariance_(with_model(conditions.occlusion.covariance, model)), run_(run) {
+    UkfParameters robust = conditions.ukf;
+    robust.outliers = OutlierPolicy::kStudentT;
+    filters_ = {make_filter(scenario, conditions, conditions.ukf), make_filter(scenario, conditions, robust)};
   }
 
-  /// The first map -> odom of the filter.
-  const std::optional<TimedPose>& start() const { return start_; }
-
   void add_odometry(const OdometrySample& sample) {
-    localization_->add_odometry(sample);
+    for (const auto& filter : filters_) filter->add_odometry(sample);
     take_outputs();
   }
 
-  void add_cloud(Stamp stamp, const PointCloud& cloud, const Eigen::Isometry3d& sensor_in_base,
-                 const Pose2& base_in_odom) {
-    if (wants_clouds_) occlusion_->add_cloud(stamp, cloud, sensor_in_base, to_isometry(base_in_odom));
+  void add_yaw_rate(Stamp stamp, double yaw_rate_radps) {
+    for (const auto& filter : filters_) filter->add_imu_yaw_rate(stamp, yaw_rate_radps);
   }
 
-  void add_epoch(const Epoch& epoch, const Pose2& base_in_odom) {
-    occlusion_->set_satellites(epoch.stamp, epoch.satellites, epoch.angle_resolution_rad);
-    if (!epoch.fix) return;
+  /// A fix of an epoch, and its satellites as the map sees them.
+  void add_fix(const Epoch& epoch, const std::vector<SatelliteObservation>& satellites, bool has_map) {
     const Eigen::Matrix2d claimed = epoch.fix->covariance.topLeftCorner<2, 2>();
-    const FixAssessment assessment = occlusion_->assess(epoch.stamp, claimed, to_isometry(base_in_odom));
-    const GnssCovariance& covariance = assessment.covariance;
-    run_.fixes.push_back(
-        {epoch.stamp, epoch.error_m, claimed, covariance.weighted, covariance.is_good, assessment.has_map});
-    if (assessment.has_map) tally(assessment, epoch.has_line_of_sight);
-
+    const GnssCovariance covariance = covariance_.process(epoch.stamp, satellites, std::nullopt, claimed);
+    run_.fixes.push_back({epoch.stamp, epoch.fix->position.head<2>(), epoch.error_m, claimed, covariance.weighted,
+                          covariance.is_good, has_map});
     RawFix fix;
     fix.stamp = epoch.stamp;
     fix.position = frame_.to_geodetic(epoch.fix->position);
     fix.covariance = epoch.fix->covariance;
     fix.covariance.topLeftCorner<2, 2>() = covariance.weighted;
     fix.covariance_type = CovarianceType::kKnown;
-    localization_->add_fix(fix);
+    for (const auto& filter : filters_) filter->add_fix(fix);
     take_outputs();
   }
 
+  /// map -> odom of the last estimate.
+  const std::optional<WorldAlignment>& alignment() const { return alignment_; }
+
  private:
-  void take_outputs() {
-    for (const LocalizationOutput& output : localization_->take_outputs()) {
-      const Pose2 odom_in_map = map_to_odometry(output);
-      if (!start_) start_ = TimedPose{output.stamp, odom_in_map};
-      run_.estimate.push_back({output.stamp, output.estimate.pose, output.estimate.covariance});
-      occlusion_->set_alignment(
-          {output.stamp, odom_in_map, std::sqrt(std::max(0.0, output.estimate.covariance(2, 2)))});
-    }
-    localization_->take_events();
-    localization_->take_verdicts();
+  static GnssCovarianceParameters with_model(GnssCovarianceParameters parameters, CovarianceModel model) {
+    parameters.model = model;
+    return parameters;
   }
 
-  void tally(const FixAssessment& assessment, const std::vector<bool>& has_line_of_sight) {
-    for (std::size_t i = 0; i < assessment.satellites.size() && i < has_line_of_sight.size(); ++i) {
-      const SatelliteObservation& satellite = assessment.satellites[i];
-      if (!assessment.covariance.satellites[i].is_used || !std::isfinite(satellite.blocked_fraction)) continue;
-      const std::size_t truth = has_line_of_sight[i] ? 1 : 0;
-      ++run_.satellites.counts[truth][satellite.blocked_fraction < blocked_threshold_ ? 1 : 0];
-      run_.satellites.known_sum[truth] += satellite.known_fraction;
+  static std::unique_ptr<LocalizationPipeline> make_filter(const Scenario& scenario,
+                                                           const OcclusionExperimentConditions& conditions,
+                                                           const UkfParameters& ukf) {
+    auto filter =
+        std::make_unique<LocalizationPipeline>(conditions.localization, std::make_unique<Ukf>(ukf, conditions.motion));
+    filter->set_antenna_offset(scenario.vehicle.antenna().head<2>());
+    filter->set_datum(scenario.datum);
+    return filter;
+  }
+
+  void take_outputs() {
+    const std::array<Trajectory*, 2> trajectories{&run_.estimate, &run_.robust_estimate};
+    for (std::size_t i = 0; i < filters_.size(); ++i) {
+      for (const LocalizationOutput& output : filters_[i]->take_outputs()) {
+        trajectories[i]->push_back({output.stamp, output.estimate.pose, output.estimate.covariance});
+        if (i > 0) continue;
+        alignment_ = {output.stamp, map_to_odometry(output),
+                      std::sqrt(std::max(0.0, output.estimate.covariance(2, 2)))};
+      }
+      filters_[i]->take_events();
+      filters_[i]->take_verdicts();
     }
   }
 
   LocalFrame frame_;
-  double blocked_threshold_;
-  bool wants_clouds_;
+  GnssCovarianceModel covariance_;
   OcclusionModelRun& run_;
-  std::unique_ptr<OcclusionPipeline> occlusion_;
-  std::unique_ptr<LocalizationPipeline> localization_;
-  std::optional<TimedPose> start_;
+  std::array<std::unique_ptr<LocalizationPipeline>, 2> filters_;  ///< as in the conditions, and the robust one
+  std::optional<WorldAlignment> alignment_;
 };
 
 /// Sorts the simulator's events, and holds back clouds and epochs until odometry has reached them.
@@ -142,7 +135,10 @@ class Experiment {
   Experiment(const Scenario& scenario, const OcclusionExperimentConditions& conditions, OcclusionRun& run)
       : sensor_in_base_(Eigen::Isometry3d(Eigen::Translation3d(scenario.lidar.mount()))),
         cloud_every_(scenario.lidar.type == LidarType::kSpinning ? std::max(1, conditions.cloud_every) : 1),
-        run_(run) {
+        blocked_threshold_(conditions.occlusion.covariance.blocked_threshold),
+        run_(run),
+        occlusion_(conditions.occlusion) {
+    occlusion_.set_antenna(scenario.vehicle.antenna());
     for (std::size_t i = 0; i < kComparedModels.size(); ++i) {
       contestants_.push_back(std::make_unique<Contestant>(kComparedModels[i], scenario, conditions, run.models[i]));
     }
@@ -157,10 +153,15 @@ class Experiment {
   }
 
   void finish() {
-    const auto& start = contestants_.front()->start();
-    if (!start) return;
+    const Trajectory& conventional = run_.models.front().estimate;
+    if (conventional.empty()) return;
+    const Stamp start = conventional.front().stamp;
+    const auto truth = interpolate(run_.truth, start, kOdometryGap);
+    const auto odometry = interpolate(odometry_, start, kOdometryGap);
+    if (!truth || !odometry) return;
+    const Pose2 odom_in_map = compose(truth->pose, inverse(odometry->pose));
     for (const TimedPose& pose : odometry_) {
-      if (pose.stamp >= start->stamp) run_.odometry.push_back({pose.stamp, compose(start->pose, pose.pose)});
+      if (pose.stamp >= start) run_.odometry.push_back({pose.stamp, compose(odom_in_map, pose.pose)});
     }
   }
 
@@ -169,8 +170,11 @@ class Experiment {
   void add(const OdometryEvent& odometry) {
     odometry_.push_back({stamp_, odometry.pose});
     for (const auto& contestant : contestants_) contestant->add_odometry({stamp_, odometry.pose, odometry.twist});
+    take_heading();
   }
-  void add(const ImuMessage&) {}
+  void add(const ImuMessage& imu) {
+    for (const auto& contestant : contestants_) contestant->add_yaw_rate(stamp_, imu.angular_velocity_radps.z());
+  }
   void add(const LidarScan& scan) {
     if (scans_++ % cloud_every_ == 0) clouds_.emplace_back(stamp_, to_point_cloud(scan));
   }
@@ -205,18 +209,44 @@ class Experiment {
       const auto& [stamp, cloud] = clouds_.front();
       const auto base = interpolate(odometry_, stamp, kOdometryGap);
       if (!base) continue;
-      for (const auto& contestant : contestants_) contestant->add_cloud(stamp, cloud, sensor_in_base_, base->pose);
+      occlusion_.add_cloud(stamp, cloud, sensor_in_base_, to_isometry(base->pose));
     }
     for (; !epochs_.empty() && epochs_.front().stamp <= reached; epochs_.pop_front()) {
       const auto base = interpolate(odometry_, epochs_.front().stamp, kOdometryGap);
       if (!base) continue;
-      for (const auto& contestant : contestants_) contestant->add_epoch(epochs_.front(), base->pose);
+      weigh(epochs_.front(), to_isometry(base->pose));
+    }
+  }
+
+  void weigh(const Epoch& epoch, const Eigen::Isometry3d& base_in_odom) {
+    occlusion_.set_satellites(epoch.stamp, epoch.satellites, epoch.angle_resolution_rad);
+    if (!epoch.fix) return;
+    const FixAssessment assessment = occlusion_.assess(epoch.stamp, std::nullopt, base_in_odom);
+    if (assessment.has_map) tally(assessment, epoch.has_line_of_sight);
+    for (const auto& contestant : contestants_) contestant->add_fix(epoch, assessment.satellites, assessment.has_map);
+    take_heading();
+  }
+
+  void take_heading() {
+    static_assert(kComparedModels.back() == CovarianceModel::kSoft);
+    if (contestants_.back()->alignment()) occlusion_.set_alignment(*contestants_.back()->alignment());
+  }
+
+  void tally(const FixAssessment& assessment, const std::vector<bool>& has_line_of_sight) {
+    for (std::size_t i = 0; i < assessment.satellites.size() && i < has_line_of_sight.size(); ++i) {
+      const SatelliteObservation& satellite = assessment.satellites[i];
+      if (!assessment.covariance.satellites[i].is_used || !std::isfinite(satellite.blocked_fraction)) continue;
+      const std::size_t truth = has_line_of_sight[i] ? 1 : 0;
+      ++run_.satellites.counts[truth][satellite.blocked_fraction < blocked_threshold_ ? 1 : 0];
+      run_.satellites.known_sum[truth] += satellite.known_fraction;
     }
   }
 
   Eigen::Isometry3d sensor_in_base_;
   int cloud_every_;
+  double blocked_threshold_;
   OcclusionRun& run_;
+  OcclusionPipeline occlusion_;
   std::vector<std::unique_ptr<Contestant>> contestants_;
   Stamp stamp_{0};  ///< of the event at hand
   int scans_{0};

@@ -53,8 +53,9 @@ double nlos_probability(const SatelliteObservation& satellite, const GnssCovaria
   const double by_map = nlos_by_map(ray_shares(satellite.blocked_fraction, satellite.known_fraction), parameters);
   if (!has_cn0(satellite)) return by_map;
   const double cn0 = std::min(satellite.cn0_dbhz, kMaxCn0_dbhz);
-  const double by_signal = (parameters.nlos_cn0 - cn0) / parameters.nlos_cn0_width -
-                           parameters.nlos_elevation_slope * (std::sin(satellite.look.elevation_rad) - kReferenceSine);
+  const double as_likely =
+      parameters.nlos_cn0 + parameters.nlos_cn0_rise * (std::sin(satellite.look.elevation_rad) - kReferenceSine);
+  const double by_signal = (as_likely - cn0) / parameters.nlos_cn0_width;
   return probability_of(by_signal + log_odds(by_map) - log_odds(parameters.nlos_if_unknown));
 }
 
@@ -117,10 +118,18 @@ std::vector<RangingSatellite> ranging(const std::vector<SatelliteObservation>& s
   return result;
 }
 
-/// C of the header's derivation; nothing where the geometry does not determine the position.
-std::optional<Eigen::Matrix2d> soft_covariance(const std::vector<RangingSatellite>& satellites,
-                                               const std::vector<double>& nlos_probabilities,
-                                               const GnssCovarianceParameters& parameters) {
+/// A fix's error, of which the header derives C.
+struct SoftError {
+  Eigen::Vector2d mean;
+  Eigen::Matrix2d covariance;  ///< about the mean
+
+  Eigen::Matrix2d second_moment() const { return covariance + mean * mean.transpose(); }
+};
+
+/// Nothing where the geometry does not determine the position.
+std::optional<SoftError> soft_error(const std::vector<RangingSatellite>& satellites,
+                                    const std::vector<double>& nlos_probabilities,
+                                    const GnssCovarianceParameters& parameters) {
   if (!dilution_of_precision(satellites)) return std::nullopt;
   std::map<int, Eigen::Index> clocks;
   for (const RangingSatellite& satellite : satellites) {
@@ -142,9 +151,7 @@ std::optional<Eigen::Matrix2d> soft_covariance(const std::vector<RangingSatellit
   const Eigen::MatrixXd weighted = weight.asDiagonal() * h;
   const Eigen::MatrixXd normal = h.transpose() * weighted;
   const Eigen::Matrix<double, 2, Eigen::Dynamic> gain = normal.ldlt().solve(weighted.transpose()).topRows<2>();
-  const Eigen::Vector2d bias = gain * mean;
-  const Eigen::Matrix2d covariance = gain * variance.asDiagonal() * gain.transpose() + bias * bias.transpose();
-  return symmetric(covariance);
+  return SoftError{gain * mean, symmetric(gain * variance.asDiagonal() * gain.transpose())};
 }
 
 bool is_positive_definite(const Eigen::Matrix2d& matrix) {
@@ -215,10 +222,13 @@ void with_satellites(const std::vector<SatelliteObservation>& satellites, const 
   switch (parameters.model) {
     case CovarianceModel::kConventional: result.model = result.conventional; break;
     case CovarianceModel::kPaper: result.model = covariance_of(dop_visible, parameters); break;
-    case CovarianceModel::kSoft:
+    case CovarianceModel::kSoft: {
       for (std::size_t k = 0; k < used.size(); ++k) all[k].weight = receiver_weight(satellites[used[k]], parameters);
-      result.model = soft_covariance(all, probabilities, parameters).value_or(parameters.filter.infinite());
+      const auto error = soft_error(all, probabilities, parameters);
+      result.model = error ? error->second_moment() : parameters.filter.infinite();
+      if (error) result.bias = error->mean;
       break;
+    }
   }
 }
 
@@ -254,6 +264,7 @@ const char* to_string(VisibilitySource source) {
 }
 
 void GnssCovarianceParameters::check(std::vector<std::string>& faults) const {
+  memory.check(faults);
   filter.check(faults);
   if (!(nlos_if_free <= nlos_if_unknown && nlos_if_unknown <= nlos_if_blocked)) {
     faults.push_back("nlos_if_unknown = " + std::to_string(nlos_if_unknown) + ": must lie between nlos_if_free = " +
@@ -290,16 +301,37 @@ GnssCovariance gnss_covariance(const std::vector<SatelliteObservation>& satellit
   return result;
 }
 
-GnssCovariance GnssCovarianceModel::process(const std::vector<SatelliteObservation>& satellites,
+GnssCovariance GnssCovarianceModel::process(Stamp stamp, const std::vector<SatelliteObservation>& satellites,
                                             const std::optional<SkyObservation>& sky,
                                             const std::optional<Eigen::Matrix2d>& claimed) {
   GnssCovariance result = gnss_covariance(satellites, sky, claimed, parameters_);
-  if (parameters_.model != CovarianceModel::kPaper) return result;
-  const CovarianceFilter::Result filtered = filter_.add(result.model);
-  result.weighted = bounded(filtered.covariance, usable_claim(claimed), parameters_);
-  result.is_good = filtered.is_good;
-  result.is_recovering = filtered.is_recovering;
+  switch (parameters_.model) {
+    case CovarianceModel::kConventional: break;
+    case CovarianceModel::kPaper: {
+      const CovarianceFilter::Result filtered = filter_.add(result.model);
+      result.weighted = bounded(filtered.covariance, usable_claim(claimed), parameters_);
+      result.is_good = filtered.is_good;
+      result.is_recovering = filtered.is_recovering;
+      break;
+    }
+    case CovarianceModel::kSoft: {
+      const bool is_determined = result.satellite_count == 0 || std::isfinite(result.hdop_all);
+      if (!is_determined) break;
+      const bool is_good_alone = result.is_good;
+      const Eigen::Matrix2d remembered =
+          memory_.add(stamp, result.bias, result.model - result.bias * result.bias.transpose());
+      result.weighted = bounded(remembered, usable_claim(claimed), parameters_);
+      result.is_good = position_sigma(remembered) <= parameters_.filter.sigma_threshold;
+      result.is_recovering = is_good_alone && !result.is_good;
+      break;
+    }
+  }
   return result;
+}
+
+void GnssCovarianceModel::reset() {
+  filter_.reset();
+  memory_.reset();
 }
 
 }  // namespace urban_gnss

@@ -28,11 +28,9 @@ std::vector<double> normal_quantiles(int count) {
 
 SatelliteVisibility assess_visibility(const RayTracer& tracer, const ObservedSpace& observed,
                                       const AntennaPose& antenna, const LookAngles& look, double angle_resolution_rad,
-                                      const VisibilityParameters& parameters) {
+                                      const VisibilitySampling& sampling) {
   const double rounding_sigma = angle_resolution_rad / std::sqrt(12.0);
   const double azimuth_sigma = std::hypot(antenna.east_yaw_sigma_rad, rounding_sigma);
-  const std::vector<double> across = normal_quantiles(parameters.azimuth_samples);
-  const std::vector<double> upwards = normal_quantiles(parameters.elevation_samples);
 
   SatelliteVisibility visibility;
   const Eigen::Vector3d centre = direction(look, antenna.east_yaw_rad);
@@ -43,20 +41,21 @@ SatelliteVisibility assess_visibility(const RayTracer& tracer, const ObservedSpa
 
   double blocked = 0.0;
   double known = 0.0;
-  for (const double a : across) {
+  for (const double a : sampling.across) {
     const Eigen::Vector3d origin = antenna.position + a * antenna.position_sigma_m * sideways;
-    for (const double e : upwards) {
+    for (const double e : sampling.upwards) {
       const LookAngles ray{look.azimuth_rad + a * azimuth_sigma,
                            std::clamp(look.elevation_rad + e * rounding_sigma, 0.0, 0.5 * kPi)};
       const Eigen::Vector3d towards = direction(ray, antenna.east_yaw_rad);
       const RayVerdict verdict = tracer.trace(origin, towards);
-      const double share = verdict.blocked ? 1.0 : std::min(1.0, verdict.vegetation_m / parameters.permeable_loss);
+      const double share =
+          verdict.blocked ? 1.0 : std::min(1.0, verdict.vegetation_m / sampling.parameters.permeable_loss);
       blocked += share;
       // What blocks has been seen. A free way is known as far as it has been looked at.
-      known += verdict.blocked ? 1.0 : observed.known_fraction(origin, towards, parameters.known_range);
+      known += verdict.blocked ? 1.0 : observed.known_fraction(origin, towards, sampling.parameters.known_range);
     }
   }
-  const double rays = static_cast<double>(across.size() * upwards.size());
+  const double rays = static_cast<double>(sampling.across.size() * sampling.upwards.size());
   visibility.blocked_fraction = blocked / rays;
   visibility.known_fraction = known / rays;
   return visibility;

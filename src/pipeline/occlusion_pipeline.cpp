@@ -62,6 +62,7 @@ OcclusionPipeline::OcclusionPipeline(const OcclusionPipelineParameters& paramete
     : parameters_(parameters),
       local_map_(parameters.local_map, parameters.voxels, parameters.aligner),
       voxel_tracer_(local_map_.map(), parameters.voxel_tracer),
+      sampling_(parameters.visibility),
       covariance_(parameters.covariance),
       consistency_(parameters.consistency),
       antenna_in_base_(parameters.occlusion.antenna_offset[0], parameters.occlusion.antenna_offset[1],
@@ -198,9 +199,8 @@ FixAssessment OcclusionPipeline::assess(Stamp stamp, const std::optional<Eigen::
     for (std::size_t i = 0; i < assessment.satellites.size(); ++i) {
       SatelliteObservation& satellite = assessment.satellites[i];
       if (!has_direction(satellite)) continue;
-      assessment.visibilities[i] =
-          assess_visibility(tracer(), local_map_.map().observed_space(), *antenna, satellite.look,
-                            epoch->angle_resolution_rad, parameters_.visibility);
+      assessment.visibilities[i] = assess_visibility(tracer(), local_map_.map().observed_space(), *antenna,
+                                                     satellite.look, epoch->angle_resolution_rad, sampling_);
       satellite.blocked_fraction = assessment.visibilities[i].blocked_fraction;
       satellite.known_fraction = assessment.visibilities[i].known_fraction;
     }
@@ -211,7 +211,7 @@ FixAssessment OcclusionPipeline::assess(Stamp stamp, const std::optional<Eigen::
     }
     if (epoch == nullptr) sky = observe_sky(*antenna);
   }
-  assessment.covariance = covariance_.process(assessment.satellites, sky, claimed);
+  assessment.covariance = covariance_.process(stamp, assessment.satellites, sky, claimed);
   return assessment;
 }
 

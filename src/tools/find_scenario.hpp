@@ -10,14 +10,20 @@
 
 namespace urban_gnss {
 
+/// Where the package's files are. Throws std::runtime_error where ROS does not know it.
+inline std::filesystem::path package_path() {
+  const std::string package = ros::package::getPath("urban_gnss_localization");
+  if (package.empty()) throw std::runtime_error("package urban_gnss_localization: not found, source its setup.bash");
+  return package;
+}
+
 /// The file of a scenario that is given by path or by the name that it has in this package. Throws std::runtime_error
 /// that lists the names where it is neither.
 inline std::filesystem::path find_scenario(const std::string& name) {
   namespace fs = std::filesystem;
   if (fs::is_regular_file(name)) return name;
-  const fs::path package = ros::package::getPath("urban_gnss_localization");
+  const fs::path package = package_path();
   std::string known;
-  if (package.empty()) throw std::runtime_error(name + ": no such file");
   for (const fs::path& candidate :
        {package / "scenarios" / (name + ".yaml"), package / "config" / name / "simulator.yaml"}) {
     if (fs::is_regular_file(candidate)) return candidate;

@@ -18,6 +18,7 @@
 #include <thread>
 
 #include "find_scenario.hpp"
+#include "occlusion_series.hpp"
 #include "output_file.hpp"
 #include "urban_gnss_localization/common/progress.hpp"
 #include "urban_gnss_localization/evaluation/report_json.hpp"
@@ -37,16 +38,18 @@ struct Options {
   int first_seed = 1;
   double duration_s = 0.0;
   int cloud_every = 5;
+  std::string occlusion_file;
   std::vector<std::string> occlusion_overrides;
   std::vector<std::string> ukf_overrides;
   std::vector<std::string> scenario_overrides;
   std::string json_file;
+  std::string series_directory;
   int jobs = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
 };
 
 template <class... P>
-void read_overrides(const std::string& option, const std::vector<std::string>& overrides, P&... parameters) {
-  YAML::Node map;
+void read_overrides(const std::string& option, YAML::Node map, const std::vector<std::string>& overrides,
+                    P&... parameters) {
   for (const std::string& text : overrides) {
     const auto equal = text.find('=');
     if (equal == std::string::npos) throw std::runtime_error(option + " " + text + ": must be NAME=VALUE");
@@ -60,8 +63,12 @@ void read_overrides(const std::string& option, const std::vector<std::string>& o
 
 OcclusionExperimentConditions read_conditions(const Options& options) {
   OcclusionExperimentConditions conditions;
-  read_overrides("--set", options.occlusion_overrides, conditions.occlusion);
-  read_overrides("--ukf-set", options.ukf_overrides, conditions.ukf, conditions.motion, conditions.localization);
+  const std::string file = options.occlusion_file.empty()
+                               ? (package_path() / "config/occlusion_simulator.yaml").string()
+                               : options.occlusion_file;
+  read_overrides(file + ", --set", YAML::LoadFile(file), options.occlusion_overrides, conditions.occlusion);
+  read_overrides("--ukf-set", YAML::Node(), options.ukf_overrides, conditions.ukf, conditions.motion,
+                 conditions.localization);
   conditions.cloud_every = options.cloud_every;
   return conditions;
 }
@@ -97,13 +104,12 @@ nlohmann::json classification_json(const std::vector<OcclusionRun>& runs, std::s
 }
 
 /// Share of satellites of which the map says the truth, by whether they have a line of sight.
-nlohmann::json satellites_json(const std::vector<OcclusionRun>& runs, std::size_t model) {
+nlohmann::json satellites_json(const std::vector<OcclusionRun>& runs) {
   LineOfSightTally all;
   for (const OcclusionRun& run : runs) {
     for (const std::size_t truth : {0U, 1U}) {
-      for (const std::size_t said : {0U, 1U})
-        all.counts[truth][said] += run.models[model].satellites.counts[truth][said];
-      all.known_sum[truth] += run.models[model].satellites.known_sum[truth];
+      for (const std::size_t said : {0U, 1U}) all.counts[truth][said] += run.satellites.counts[truth][said];
+      all.known_sum[truth] += run.satellites.known_sum[truth];
     }
   }
   const auto direct = static_cast<double>(all.count(true));
@@ -181,10 +187,12 @@ nlohmann::json scenario_json(const std::vector<OcclusionRun>& runs) {
     json["fix_nees"][name] = fix_json(runs, i, false);
     json["trajectory"][name] =
         trajectory_json(runs, [i](const OcclusionRun& run) -> const Trajectory& { return run.models[i].estimate; });
+    json["trajectory_student_t"][name] = trajectory_json(
+        runs, [i](const OcclusionRun& run) -> const Trajectory& { return run.models[i].robust_estimate; });
     if (kComparedModels[i] == CovarianceModel::kConventional) continue;
     json["classification"][name] = classification_json(runs, i);
-    json["satellites"][name] = satellites_json(runs, i);
   }
+  json["satellites"] = satellites_json(runs);
   return json;
 }
 
@@ -204,7 +212,7 @@ void print(const std::string& scenario, const nlohmann::json& json) {
                "satellites: direct>free  hidden>blocked  known direct/hidden\n";
   for (const char* name : {"paper", "soft"}) {
     const auto& c = json["classification"][name];
-    const auto& s = json["satellites"][name];
+    const auto& s = json["satellites"];
     std::cout << std::left << std::setw(13) << name << std::right << std::setw(7) << text_of(c["correct"], 100, 1)
               << " %" << std::setw(7) << text_of(c["correct_of_good"], 100, 1) << " %" << std::setw(6)
               << text_of(c["correct_of_bad"], 100, 1) << " %";
@@ -236,6 +244,11 @@ void print(const std::string& scenario, const nlohmann::json& json) {
     }
     std::cout << '\n';
   }
+  std::cout << "With a Student-t UKF: position, m";
+  for (const auto& [name, t] : json["trajectory_student_t"].items()) {
+    std::cout << "   " << name << ' ' << text_of(t["position_mean_m"], 1, 2);
+  }
+  std::cout << '\n';
 }
 
 void run_all(const Options& options, const std::string& command) {
@@ -286,6 +299,7 @@ void run_all(const Options& options, const std::string& command) {
     const std::string name = fs::path(options.scenarios[i]).stem().string();
     metrics["scenarios"][name] = scenario_json(results[i]);
     print(name, metrics["scenarios"][name]);
+    if (!options.series_directory.empty()) write_series(options.series_directory, name, results[i].front());
   }
   if (!options.json_file.empty())
     write_file(options.json_file, [&](std::ostream& out) { out << metrics.dump(2) << '\n'; });
@@ -304,11 +318,15 @@ int main(int argc, char** argv) {
       ->check(CLI::PositiveNumber);
   app.add_option("--cloud-every", options.cloud_every, "of a spinning lidar's scans, use one in so many")
       ->check(CLI::PositiveNumber);
+  app.add_option("--occlusion", options.occlusion_file,
+                 "parameters of the occlusion node; default: config/occlusion_simulator.yaml of the package");
   app.add_option("--set", options.occlusion_overrides, "a parameter of the occlusion node, NAME=VALUE; repeatable");
   app.add_option("--ukf-set", options.ukf_overrides, "a parameter of ukf or localization, NAME=VALUE; repeatable");
   app.add_option("--scenario-set", options.scenario_overrides,
                  "a value of the scenario, SECTION.NAME=VALUE; repeatable");
   app.add_option("--json", options.json_file, "write the metrics here");
+  app.add_option("--series", options.series_directory,
+                 "write the first seed's fixes and trajectories here as CSV, for figures");
   app.add_option("--jobs", options.jobs, "threads")->check(CLI::PositiveNumber);
   CLI11_PARSE(app, argc, argv);
   std::string command = "rosrun urban_gnss_localization occlusion_experiment";

@@ -199,34 +199,63 @@ TEST(GnssCovariance, TurnsWithTheSky) {
   }
 }
 
-TEST(GnssCovarianceModel, PaperRecoversAfterARunAndSoftDoesNot) {
+/// A receiver of 5 Hz.
+Stamp nth_epoch(int n) { return n * std::chrono::milliseconds(200); }
+
+TEST(GnssCovarianceModel, PaperAndSoftRecoverAfterARun) {
   for (const auto model : {CovarianceModel::kPaper, CovarianceModel::kSoft}) {
     GnssCovarianceModel covariance(with_model(model));
-    for (int i = 0; i < 10; ++i) {
-      EXPECT_FALSE(covariance.process(open_sky(kNaN, 1.0), std::nullopt, std::nullopt).is_good);
+    int n = 0;
+    for (; n < 10; ++n) {
+      const auto result = covariance.process(nth_epoch(n), open_sky(kNaN, 1.0), std::nullopt, std::nullopt);
+      EXPECT_FALSE(result.is_good);
+      EXPECT_FALSE(result.is_recovering);
     }
     const bool is_paper = model == CovarianceModel::kPaper;
-    for (int i = 0; i < 2; ++i) {
-      const auto result = covariance.process(open_sky(kNaN, 0.0), std::nullopt, std::nullopt);
-      EXPECT_EQ(result.is_recovering, is_paper);
-      EXPECT_EQ(result.is_good, !is_paper);
+    for (; n < 12; ++n) {
+      const auto result = covariance.process(nth_epoch(n), open_sky(kNaN, 0.0), std::nullopt, std::nullopt);
+      EXPECT_TRUE(result.is_recovering);
+      EXPECT_FALSE(result.is_good);
       EXPECT_EQ(position_sigma(result.weighted) > 800.0, is_paper);
+      EXPECT_GT(position_sigma(result.weighted), position_sigma(result.model));
     }
-    EXPECT_TRUE(covariance.process(open_sky(kNaN, 0.0), std::nullopt, std::nullopt).is_good);
+    for (; n < 300; ++n) covariance.process(nth_epoch(n), open_sky(kNaN, 0.0), std::nullopt, std::nullopt);
+    const auto result = covariance.process(nth_epoch(n), open_sky(kNaN, 0.0), std::nullopt, std::nullopt);
+    EXPECT_TRUE(result.is_good);
+    EXPECT_FALSE(result.is_recovering);
+    EXPECT_TRUE(result.weighted.isApprox(result.model, 1e-2));
   }
 }
 
-TEST(GnssCovarianceModel, ResetForgetsTheRun) {
-  GnssCovarianceModel covariance(with_model(CovarianceModel::kPaper));
-  for (int i = 0; i < 10; ++i) covariance.process(open_sky(kNaN, 1.0), std::nullopt, std::nullopt);
-  covariance.reset();
-  EXPECT_TRUE(covariance.process(open_sky(kNaN, 0.0), std::nullopt, std::nullopt).is_good);
+TEST(GnssCovarianceModel, SoftRemembersNoFixThatTheSatellitesDoNotDetermine) {
+  GnssCovarianceModel covariance(with_model(CovarianceModel::kSoft));
+  Sky three = open_sky(kNaN, 0.0);
+  three.resize(3);
+  EXPECT_GT(position_sigma(covariance.process(nth_epoch(0), three, std::nullopt, std::nullopt).weighted), 800.0);
+  const auto result = covariance.process(nth_epoch(1), open_sky(kNaN, 0.0), std::nullopt, std::nullopt);
+  EXPECT_TRUE(result.weighted.isApprox(result.model, 1e-12));
 }
 
-TEST(GnssCovarianceModel, FilteredPaperIsNotBelowTheClaim) {
-  GnssCovarianceModel covariance(with_model(CovarianceModel::kPaper));
+TEST(GnssCovarianceModel, ResetForgetsTheRun) {
+  for (const auto model : {CovarianceModel::kPaper, CovarianceModel::kSoft}) {
+    GnssCovarianceModel covariance(with_model(model));
+    for (int n = 0; n < 10; ++n) {
+      covariance.process(nth_epoch(n), open_sky(kNaN, 1.0), std::nullopt, std::nullopt);
+    }
+    covariance.reset();
+    EXPECT_TRUE(covariance.process(nth_epoch(10), open_sky(kNaN, 0.0), std::nullopt, std::nullopt).is_good);
+  }
+}
+
+TEST(GnssCovarianceModel, RememberedIsNotBelowTheClaim) {
   const Eigen::Matrix2d claim = 1e6 * Eigen::Matrix2d::Identity();
-  EXPECT_GE(excess(covariance.process(open_sky(kNaN, 1.0), std::nullopt, claim).weighted, claim), -1e-12);
+  for (const auto model : {CovarianceModel::kPaper, CovarianceModel::kSoft}) {
+    GnssCovarianceModel covariance(with_model(model));
+    for (int n = 0; n < 3; ++n) {
+      const auto result = covariance.process(nth_epoch(n), open_sky(kNaN, 1.0), std::nullopt, claim);
+      EXPECT_GE(excess(result.weighted, claim), -1e-12);
+    }
+  }
 }
 
 TEST(GnssCovariance, EveryParameterHasAnEffectF36) {
@@ -242,9 +271,11 @@ TEST(GnssCovariance, EveryParameterHasAnEffectF36) {
     GnssCovarianceModel model(p);
     std::ostringstream text;
     text.precision(17);
+    Stamp stamp{0};
     for (const auto& observations : {sky, Sky{}, open_sky(kNaN, 1.0), open_sky(kNaN, 0.0)}) {
-      const auto with_claim = model.process(observations, std::nullopt, claim);
-      const auto without = model.process(observations, SkyObservation{0.3, 0.8}, std::nullopt);
+      stamp += std::chrono::seconds(2);
+      const auto with_claim = model.process(stamp, observations, std::nullopt, claim);
+      const auto without = model.process(stamp, observations, SkyObservation{0.3, 0.8}, std::nullopt);
       text << with_claim.weighted << without.weighted << with_claim.is_good << without.is_good;
     }
     return text.str();
@@ -261,10 +292,12 @@ TEST(GnssCovariance, EveryParameterHasAnEffectF36) {
                                                                            {"nlos_sigma", {"soft", "10.0"}},
                                                                            {"nlos_cn0", {"soft", "32.0"}},
                                                                            {"nlos_cn0_width", {"soft", "5.0"}},
-                                                                           {"nlos_elevation_slope", {"soft", "0.0"}},
+                                                                           {"nlos_cn0_rise", {"soft", "0.0"}},
                                                                            {"nlos_if_blocked", {"soft", "0.5"}},
                                                                            {"nlos_if_free", {"soft", "0.05"}},
                                                                            {"nlos_if_unknown", {"soft", "0.2"}},
+                                                                           {"receiver_smoothing_time", {"soft", "1.0"}},
+                                                                           {"receiver_coasting_time", {"soft", "1.0"}},
                                                                            {"sigma_infinite", {"paper", "100.0"}},
                                                                            {"sigma_threshold", {"paper", "0.5"}},
                                                                            {"sigma_smooth", {"paper", "900.0"}},

@@ -9,6 +9,7 @@
 
 #include "urban_gnss_localization/common/parameters.hpp"
 #include "urban_gnss_localization/gnss/covariance_filter.hpp"
+#include "urban_gnss_localization/gnss/receiver_memory.hpp"
 #include "urban_gnss_localization/gnss/satellite.hpp"
 
 namespace urban_gnss {
@@ -41,16 +42,17 @@ struct GnssCovarianceParameters {
   bool allow_smaller{false};      ///< than what the receiver claims
   double assumed_hdop{1.2};       ///< where neither the receiver nor satellites tell
   ReceiverWeighting receiver_weighting{ReceiverWeighting::kCn0};
-  double weight_cn0{40.0};           ///< dB-Hz, from here on the receiver weighs ranges equally
-  double weight_floor{0.01};         ///< least weight of a range, of 1
-  double nlos_mean{25.0};            ///< m, of the range error without line of sight
-  double nlos_sigma{25.0};           ///< m, about that mean
-  double nlos_cn0{28.0};             ///< dB-Hz, at which a signal at 37 degrees is as likely reflected as direct
-  double nlos_cn0_width{3.0};        ///< dB, that change the odds by e
-  double nlos_elevation_slope{1.5};  ///< by which the log-odds fall from the horizon to the zenith
-  double nlos_if_blocked{0.9};       ///< probability of no line of sight where the map blocks it,
-  double nlos_if_free{0.005};        ///< where the map shows free space,
-  double nlos_if_unknown{0.1};       ///< and where it shows nothing
+  double weight_cn0{40.0};      ///< dB-Hz, from here on the receiver weighs ranges equally
+  double weight_floor{0.01};    ///< least weight of a range, of 1
+  double nlos_mean{25.0};       ///< m, of the range error without line of sight
+  double nlos_sigma{25.0};      ///< m, about that mean
+  double nlos_cn0{28.0};        ///< dB-Hz, at which a signal at 37 degrees is as likely reflected as direct
+  double nlos_cn0_width{3.0};   ///< dB, that change the odds by e
+  double nlos_cn0_rise{-4.5};   ///< dB, by which nlos_cn0 rises from the horizon to the zenith
+  double nlos_if_blocked{0.9};  ///< probability of no line of sight where the map blocks it,
+  double nlos_if_free{0.005};   ///< where the map shows free space,
+  double nlos_if_unknown{0.1};  ///< and where it shows nothing
+  ReceiverMemoryParameters memory;
   CovarianceFilterParameters filter;
 
   template <class V>
@@ -67,10 +69,11 @@ struct GnssCovarianceParameters {
     v("nlos_sigma", nlos_sigma, positive());
     v("nlos_cn0", nlos_cn0, between(0.0, 70.0));
     v("nlos_cn0_width", nlos_cn0_width, positive());
-    v("nlos_elevation_slope", nlos_elevation_slope, non_negative());
+    v("nlos_cn0_rise", nlos_cn0_rise, between(-30.0, 30.0));
     v("nlos_if_blocked", nlos_if_blocked, between(0.001, 0.999));
     v("nlos_if_free", nlos_if_free, between(0.001, 0.999));
     v("nlos_if_unknown", nlos_if_unknown, between(0.001, 0.999));
+    memory.visit(v);
     filter.visit(v);
   }
   void check(std::vector<std::string>& faults) const;
@@ -108,15 +111,16 @@ struct GnssCovariance {
   double hdop_all{std::numeric_limits<double>::quiet_NaN()};      ///< NaN where the geometry does not determine it
   double hdop_visible{std::numeric_limits<double>::quiet_NaN()};  ///< likewise
   Eigen::Matrix2d conventional{Eigen::Matrix2d::Identity()};      ///< eq. (4), m^2, east and north; for comparison
-  Eigen::Matrix2d model{Eigen::Matrix2d::Identity()};             ///< of the model that was chosen, before Algorithm 3
+  Eigen::Matrix2d model{Eigen::Matrix2d::Identity()};             ///< of the model that was chosen, without memory
+  Eigen::Vector2d bias{Eigen::Vector2d::Zero()};                  ///< soft: mean error by reflections, m; within model
   Eigen::Matrix2d weighted{Eigen::Matrix2d::Identity()};          ///< to be used: not below the receiver's claim
   bool is_good{true};         ///< classification by sigma_threshold and, in the paper's model, recovery
-  bool is_recovering{false};  ///< paper's model: bad because of the fixes before
+  bool is_recovering{false};  ///< bad because of the fixes before
   std::vector<SatelliteAssessment> satellites;
 };
 
-/// Covariance of one fix without memory: all of GnssCovariance but what Algorithm 3 says (weighted, is_good and
-/// is_recovering are those of `model` alone). `claimed` is the receiver's own covariance, where it has one. Never
+/// Covariance of one fix without memory of those before it (weighted, is_good and is_recovering are those of `model`
+/// alone). `claimed` is the receiver's own covariance, where it has one. Never
 /// throws; every covariance is finite and positive definite for every input. R_inf, which is sigma_infinite^2 I,
 /// stands where the satellites do not determine the position: in the paper's model the visible ones (fewer than 3 and
 /// their constellations, or a singular geometry), else the used ones.
@@ -133,10 +137,11 @@ struct GnssCovariance {
 /// A delay that all ranges of a constellation share goes into its clock, not into C. With p = 0 and equal weights, C is
 /// eq. (4). It is a continuous function of every blocked fraction and C/N0.
 ///
-/// p_i: from C/N0 c and elevation e, the log-odds are L = (nlos_cn0 - c) / nlos_cn0_width - nlos_elevation_slope
-/// (sin e - 0.6), where nothing else is known. The map alone says q = nlos_if_blocked, nlos_if_free and
-/// nlos_if_unknown, each times the share of its rays. Both together, as independent evidence: L + logit(q) -
-/// logit(nlos_if_unknown).
+/// p_i: from C/N0 c and elevation e, the log-odds are L = (nlos_cn0 + nlos_cn0_rise (sin e - 0.6) - c) /
+/// nlos_cn0_width, where nothing else is known. The rise is positive where the antenna receives best from above, and
+/// negative where that counts for less than that what stands low is hidden more often. The map alone says q =
+/// nlos_if_blocked, nlos_if_free and nlos_if_unknown, each times the share of its rays. Both together, as independent
+/// evidence: L + logit(q) - logit(nlos_if_unknown).
 ///
 /// Without a usable satellite, the claim (or that of assumed_hdop) stands for the conventional model, and in the others
 /// is multiplied by 1 + (v(q) - v(nlos_if_free)) / sigma_URE^2 for the sky's q: what a sky evenly full of satellites
@@ -149,20 +154,23 @@ GnssCovariance gnss_covariance(const std::vector<SatelliteObservation>& satellit
 /// Requires both positive definite and finite.
 Eigen::Matrix2d at_least(const Eigen::Matrix2d& matrix, const Eigen::Matrix2d& floor);
 
-/// gnss_covariance() fix by fix, with Algorithm 3 in the paper's model.
+/// gnss_covariance() fix by fix, with the memory of a receiver: Algorithm 3 in the paper's model, ReceiverMemory in the
+/// soft one. There, a fix whose satellites do not determine the position has R_inf alone and leaves no memory: the
+/// receiver cannot have had a solution either.
 class GnssCovarianceModel {
  public:
   /// Requires parameters without faults.
   explicit GnssCovarianceModel(const GnssCovarianceParameters& parameters)
-      : parameters_(parameters), filter_(parameters.filter) {}
+      : parameters_(parameters), filter_(parameters.filter), memory_(parameters.memory) {}
 
-  GnssCovariance process(const std::vector<SatelliteObservation>& satellites, const std::optional<SkyObservation>& sky,
-                         const std::optional<Eigen::Matrix2d>& claimed);
-  void reset() { filter_.reset(); }
+  GnssCovariance process(Stamp stamp, const std::vector<SatelliteObservation>& satellites,
+                         const std::optional<SkyObservation>& sky, const std::optional<Eigen::Matrix2d>& claimed);
+  void reset();
 
  private:
   GnssCovarianceParameters parameters_;
   CovarianceFilter filter_;
+  ReceiverMemory memory_;
 };
 
 }  // namespace urban_gnss

@@ -49,13 +49,23 @@ struct SatelliteVisibility {
 /// Midpoints of `count` slices of equal probability of the standard normal distribution, ascending.
 std::vector<double> normal_quantiles(int count);
 
+/// VisibilityParameters with what follows from them, for all satellites.
+struct VisibilitySampling {
+  VisibilitySampling(const VisibilityParameters& p)  // NOLINT(google-explicit-constructor): nothing but these
+      : parameters(p), across(normal_quantiles(p.azimuth_samples)), upwards(normal_quantiles(p.elevation_samples)) {}
+
+  VisibilityParameters parameters;
+  std::vector<double> across;   ///< quantiles, of the azimuth
+  std::vector<double> upwards;  ///< likewise, of the elevation
+};
+
 /// Rays to a satellite, spread over what is not known of its direction: the heading's error is an error of the azimuth,
 /// the antenna's place and the receiver's rounding (a step of `angle_resolution_rad`) are the rest. `look` must be
 /// finite. A displacement of the antenna turns nothing at infinity, but near walls it decides; every ray starts from a
 /// place displaced across it by the quantile that its azimuth has.
 SatelliteVisibility assess_visibility(const RayTracer& tracer, const ObservedSpace& observed,
                                       const AntennaPose& antenna, const LookAngles& look, double angle_resolution_rad,
-                                      const VisibilityParameters& parameters);
+                                      const VisibilitySampling& sampling);
 
 /// How high what blocks reaches in each of `azimuths` equal steps of azimuth (clockwise from north): the elevation,
 /// rad, up to which rays are blocked, searched in steps of `step_rad`, 0 where none is. For the sky plot.

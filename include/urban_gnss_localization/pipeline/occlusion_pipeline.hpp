@@ -162,6 +162,7 @@ class OcclusionPipeline {
   OcclusionPipelineParameters parameters_;
   LocalMap local_map_;
   VoxelRayTracer voxel_tracer_;
+  VisibilitySampling sampling_;
   mutable std::unique_ptr<KdTreeRayTracer> kd_tracer_;  ///< of the map as it is; made when asked for
   GnssCovarianceModel covariance_;
   MapConsistency consistency_;

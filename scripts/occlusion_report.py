@@ -1,0 +1,260 @@
+#!/usr/bin/env python3
+"""Tables I and II and figures 5 to 7 of Maier and Kleiner (2010) on the simulated scenarios, in one command.
+
+Runs occlusion_experiment and writes OUT/metrics.json, OUT/tables.md, OUT/fig5.png, fig6.png, fig7.png and
+OUT/report.html. With --no-run it draws what is in OUT already. The workspace must be sourced, or
+URBAN_GNSS_PROGRAMS be the folder of the built programs.
+"""
+import argparse
+import os
+import subprocess
+import sys
+
+# In a devel space this file runs through a wrapper in another directory; the module lies beside the source.
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+
+import numpy as np  # noqa: E402
+
+import report_common as common  # noqa: E402
+from report_common import plt  # noqa: E402
+
+SCENARIOS = ["campus_loop", "building_pass", "downtown_grid", "open_sky"]
+MODELS = ("conventional", "paper", "soft")
+CLASSIFYING = ("paper", "soft")
+EXPECTED_NEES = 2.0
+BAD_FIX_M = 6.0
+SIGMA_CROP_M = 20.0  # as the paper's figure 5
+GOOD_COLOUR = "#009e73"
+BAD_COLOUR = "#d62728"
+ERROR_COLOUR = "#1f3a93"
+FIX_COLUMNS = ("t", "x", "y", "error", "sigma_claimed") + tuple(
+    "{}_{}".format(what, model) for model in MODELS for what in ("sigma", "good"))
+TRAJECTORY_COLUMNS = ("t", "x", "y", "yaw")
+
+
+def run_experiment(out, options):
+    """Run the program; exit with its last line where it fails."""
+    programs = os.environ.get("URBAN_GNSS_PROGRAMS")
+    name = "occlusion_experiment"
+    command = [os.path.join(programs, name)] if programs else ["rosrun", "urban_gnss_localization", name]
+    command += ["--scenarios", ",".join(options.scenarios), "--seeds", str(options.seeds), "--first-seed",
+                str(options.first_seed), "--json", os.path.join(out, "metrics.json"), "--series",
+                os.path.join(out, "data")]
+    if options.duration:
+        command += ["--duration", str(options.duration)]
+    done = subprocess.run(command + options.arguments, stdout=subprocess.DEVNULL)
+    if done.returncode != 0:
+        raise common.ReportError("{} failed".format(" ".join(command)))
+
+
+def cell(content, *keys, scale=1.0, digits=2):
+    """A number of the metrics as text."""
+    return common.format_number(scale * common.number(content, *keys), digits)
+
+
+def percent(share):
+    """A share for a table; an en dash when there is none."""
+    return "{:.1f} %".format(100.0 * share) if np.isfinite(share) else "–"
+
+
+def spread(content, name, scale=1.0, digits=2):
+    """Mean and standard deviation as text; empty where there are none."""
+    unit = "_rad" if name == "heading" else "_m"
+    if not np.isfinite(common.number(content, name + "_mean" + unit)):
+        return ""
+    return " ± ".join(cell(content, name + which + unit, scale=scale, digits=digits) for which in ("_mean", "_sigma"))
+
+
+def change(row, base, key):
+    """By how much of `base` the row is above it, as text."""
+    ratio = common.number(row, key) / common.number(base, key) - 1.0
+    return "{:+.0f} %".format(100.0 * ratio) if np.isfinite(ratio) else "–"
+
+
+def table_1(scenarios):
+    """Classification of good and bad fixes with the confusion matrix."""
+    header = ("scenario, model", "fixes", "right", "good called good", "good called bad", "bad called good",
+              "bad called bad")
+    rows = []
+    for scenario, content in scenarios.items():
+        for model in CLASSIFYING:
+            c = content["classification"][model]
+            counts = [common.number(c, key) for key in ("good_called_good", "good_called_bad", "bad_called_good",
+                                                        "bad_called_bad")]
+            good, bad = counts[0] + counts[1], counts[2] + counts[3]
+            shares = [percent(count / whole if whole else np.nan)
+                      for count, whole in zip(counts, (good, good, bad, bad))]
+            rows.append(["{}, {}".format(scenario, model), "{:.0f}".format(good + bad),
+                         percent(common.number(c, "correct"))] + shares)
+    return header, rows
+
+
+def table_2(scenarios):
+    """Errors of the UKF with each model's covariances, Gaussian and Student-t."""
+    header = ("scenario", "covariances", "position, m", "against conventional", "max, m", "orientation, deg",
+              "against conventional", "Student-t: position, m", "orientation, deg")
+    degrees = 180.0 / np.pi
+    rows = []
+    for scenario, content in scenarios.items():
+        base = content["trajectory"]["conventional"]
+        for name in ("odometry",) + MODELS:
+            t = content["trajectory"][name]
+            robust = content["trajectory_student_t"].get(name, {})
+            is_improved = name in CLASSIFYING
+            rows.append([scenario, name if name != "odometry" else "odometry alone", spread(t, "position"),
+                         change(t, base, "position_mean_m") if is_improved else "", cell(t, "position_max_m", digits=1),
+                         spread(t, "heading", degrees),
+                         change(t, base, "heading_mean_rad") if is_improved else "",
+                         spread(robust, "position"), spread(robust, "heading", degrees)])
+    return header, rows
+
+
+def table_nees(scenarios):
+    """NEES of the fix error over its expectation."""
+    header = ("scenario", "claimed by the receiver") + MODELS
+    rows = [[scenario] + [cell(content, "fix_nees", name, "mean", scale=1.0 / EXPECTED_NEES)
+                          for name in ("claimed",) + MODELS]
+            for scenario, content in scenarios.items()]
+    return header, rows
+
+
+def markdown(header, rows):
+    """A table for docs/."""
+    lines = ["| " + " | ".join(header) + " |", "|---" * len(header) + "|"]
+    return "\n".join(lines + ["| " + " | ".join(row) + " |" for row in rows]) + "\n"
+
+
+def plot_figure5(path, fixes):
+    """Error of the fixes against the models' standard deviations over time, a panel per scenario."""
+    figure, panels = plt.subplots(len(fixes), 1, figsize=(10.5, 2.3 * len(fixes)), squeeze=False)
+    for axes, (scenario, rows) in zip(panels[:, 0], fixes.items()):
+        axes.fill_between(rows["t"], 0.0, rows["error"], color="#c9d3ea", linewidth=0)
+        axes.plot(rows["t"], rows["error"], color=ERROR_COLOUR, linewidth=0.9, label="error of the fix")
+        for model, style in (("conventional", "-"), ("paper", ":"), ("soft", "-")):
+            axes.plot(rows["t"], np.minimum(rows["sigma_" + model], SIGMA_CROP_M), style, linewidth=1.2,
+                      color=MODEL_COLOURS[model], label="σ {}".format(model))
+        axes.axhline(BAD_FIX_M, color="#888888", linewidth=0.7, linestyle="--")
+        axes.set_ylim(0.0, SIGMA_CROP_M * 1.05)
+        if len(rows):
+            axes.set_xlim(rows["t"][0], rows["t"][-1])
+        axes.set_ylabel("m")
+        axes.set_title(scenario, fontsize=10, loc="left")
+        common.light_grid(axes)
+    panels[-1, 0].set_xlabel("time [s]")
+    common.legend_beside(panels[0, 0])
+    figure.subplots_adjust(hspace=0.45)
+    common.save_figure(figure, path)
+
+
+def map_panels(scenarios):
+    """A figure with an axes of equal scales for each scenario."""
+    columns = min(2, len(scenarios))
+    rows = -(-len(scenarios) // columns)
+    figure, grid = plt.subplots(rows, columns, figsize=(5.6 * columns, 4.6 * rows), squeeze=False,
+                                constrained_layout=True)
+    for axes in grid.ravel()[len(scenarios):]:
+        axes.set_axis_off()
+    for axes, scenario in zip(grid.ravel(), scenarios):
+        axes.set_aspect("equal")
+        axes.set_title(scenario, fontsize=10, loc="left")
+        axes.set_xlabel("east [m]")
+        axes.set_ylabel("north [m]")
+        common.light_grid(axes)
+    return figure, dict(zip(scenarios, grid.ravel()))
+
+
+def plot_figure6(path, fixes, truths):
+    """The fixes, green where the soft model calls them good and red where bad, on the true trajectory."""
+    figure, panels = map_panels(list(fixes))
+    for scenario, axes in panels.items():
+        rows = fixes[scenario]
+        axes.plot(truths[scenario]["x"], truths[scenario]["y"], color="#f0c000", linewidth=2.5, zorder=1,
+                  label="true trajectory")
+        for good, colour, label in ((1, GOOD_COLOUR, "called good"), (0, BAD_COLOUR, "called bad")):
+            chosen = rows["good_soft"] == good
+            axes.plot(rows["x"][chosen], rows["y"][chosen], ".", color=colour, markersize=2.5, zorder=3 - good,
+                      label=label)
+    legend = next(iter(panels.values())).legend(fontsize=8, loc="best")
+    for handle in legend.get_lines():
+        handle.set_markersize(8)
+    common.save_figure(figure, path)
+
+
+def plot_figure7(path, truths, estimates):
+    """The trajectories of the UKF with the conventional and the soft covariances."""
+    figure, panels = map_panels(list(truths))
+    for scenario, axes in panels.items():
+        axes.plot(truths[scenario]["x"], truths[scenario]["y"], color="#f0c000", linewidth=3.0, label="true trajectory")
+        for model in ("conventional", "paper", "soft"):
+            rows = estimates[scenario][model]
+            axes.plot(rows["x"], rows["y"], color=MODEL_COLOURS[model], linewidth=1.0, label=model)
+    next(iter(panels.values())).legend(fontsize=8, loc="best")
+    common.save_figure(figure, path)
+
+
+MODEL_COLOURS = common.method_colours(MODELS)
+
+
+def make_report(out):
+    """Tables, figures and page from what the program wrote into `out`; gives the path of the page."""
+    metrics = common.read_json(os.path.join(out, "metrics.json"))
+    scenarios = common.require_object(metrics, "scenarios", "metrics.json")
+    data = os.path.join(out, "data")
+
+    def trajectory(scenario, name):
+        return common.read_csv(os.path.join(data, "trajectory_{}_{}.csv".format(scenario, name)), TRAJECTORY_COLUMNS)
+    fixes = {s: common.read_csv(os.path.join(data, "fixes_{}.csv".format(s)), FIX_COLUMNS) for s in scenarios}
+    truths = {s: trajectory(s, "truth") for s in scenarios}
+    estimates = {s: {model: trajectory(s, model) for model in MODELS} for s in scenarios}
+    plot_figure5(os.path.join(out, "fig5.png"), fixes)
+    # A map without a bad fix shows nothing.
+    shown = [s for s in scenarios if np.any(fixes[s]["error"] > BAD_FIX_M)] or list(scenarios)
+    plot_figure6(os.path.join(out, "fig6.png"), {s: fixes[s] for s in shown}, truths)
+    plot_figure7(os.path.join(out, "fig7.png"), {s: truths[s] for s in shown}, estimates)
+
+    seeds = metrics.get("seeds", [])
+    tables = (("Table I: good and bad fixes, told apart at {:g} m".format(BAD_FIX_M), table_1(scenarios)),
+              ("Table II: errors of the UKF", table_2(scenarios)),
+              ("Mean NEES of the fixes' errors over its expectation", table_nees(scenarios)))
+    page = common.HtmlPage("Occlusion: covariances of fixes and what a UKF makes of them")
+    page.paragraph("Maier and Kleiner (2010), Improved GPS Sensor Model, on simulated scenarios, {} seeds; "
+                   "the figures show seed {}.".format(len(seeds), seeds[0] if seeds else "–"))
+    text = []
+    for title, (header, rows) in tables:
+        page.heading(title)
+        page.table(header, rows)
+        text.append("### {}\n\n{}".format(title, markdown(header, rows)))
+    page.heading("Figures")
+    page.image("fig5.png", "As figure 5: error of the fixes and standard deviations of the models, cut at "
+               "{:g} m; dashed: {:g} m, from which a fix is bad.".format(SIGMA_CROP_M, BAD_FIX_M))
+    page.image("fig6.png", "As figure 6: fixes that the soft model calls good (green) and bad (red).")
+    page.image("fig7.png", "As figure 7: the UKF's trajectories with each model's covariances.")
+    page.provenance(metrics, ("scenarios",))
+    with open(os.path.join(out, "tables.md"), "w", encoding="utf-8") as stream:
+        stream.write("\n".join(text))
+    page.save(os.path.join(out, "report.html"))
+    return os.path.join(out, "report.html")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("out", help="folder to write")
+    parser.add_argument("--scenarios", default=",".join(SCENARIOS), type=lambda text: text.split(","))
+    parser.add_argument("--seeds", type=int, default=10)
+    parser.add_argument("--first-seed", type=int, default=1)
+    parser.add_argument("--duration", type=float, help="s to simulate at most")
+    parser.add_argument("--no-run", action="store_true", help="draw what is there")
+    parser.add_argument("arguments", nargs="*", help="after --: passed on to occlusion_experiment")
+    options = parser.parse_args()
+    try:
+        if not options.no_run:
+            os.makedirs(options.out, exist_ok=True)
+            run_experiment(options.out, options)
+        print(make_report(options.out))
+    except common.ReportError as error:
+        print("occlusion_report: {}".format(error), file=sys.stderr)
+        sys.exit(1)
+
+
+if __name__ == "__main__":
+    main()
