@@ -2,58 +2,18 @@
 
 #include <algorithm>
 #include <cmath>
-#include <deque>
 #include <memory>
 #include <optional>
 #include <utility>
 
+#include "urban_gnss_localization/experiments/city_drive.hpp"
 #include "urban_gnss_localization/geometry/local_frame.hpp"
-#include "urban_gnss_localization/simulation/city_simulator.hpp"
 
 namespace urban_gnss {
 namespace {
 
-constexpr Stamp kOdometryGap = std::chrono::seconds(1);
-
-Eigen::Isometry3d to_isometry(const Pose2& pose) {
-  Eigen::Isometry3d isometry = Eigen::Isometry3d::Identity();
-  isometry.translate(Eigen::Vector3d(pose.x, pose.y, 0.0));
-  isometry.rotate(Eigen::AngleAxisd(pose.yaw, Eigen::Vector3d::UnitZ()));
-  return isometry;
-}
-
-PointCloud to_point_cloud(const LidarScan& scan) {
-  PointCloud cloud;
-  cloud.reserve(scan.size());
-  for (std::size_t i = 0; i < scan.size(); ++i) cloud.emplace_back(scan.x[i], scan.y[i], scan.z[i]);
-  return cloud;
-}
-
-std::vector<SatelliteObservation> to_observations(const std::vector<SatelliteReport>& reports) {
-  std::vector<SatelliteObservation> observations;
-  for (const SatelliteReport& report : reports) {
-    SatelliteObservation observation;
-    observation.id = report.id;
-    observation.look = report.look;
-    observation.cn0_dbhz = report.cn0_dbhz;
-    observation.tracked = report.is_tracked;
-    observations.push_back(observation);
-  }
-  return observations;
-}
-
-/// Everything of one epoch of the receiver; it may wait for odometry.
-struct Epoch {
-  Stamp stamp{0};
-  std::optional<ReceiverFix> fix;
-  Eigen::Vector2d error_m{Eigen::Vector2d::Zero()};
-  std::vector<SatelliteObservation> satellites;
-  double angle_resolution_rad{0.0};
-  std::vector<bool> has_line_of_sight;  ///< truth, of each satellite
-};
-
 /// A model's pipeline with the filter that uses its covariances.
-class Contestant {
+class Contestant : public DriveParticipant {
  public:
   Contestant(CovarianceModel model, const Scenario& scenario, OcclusionExperimentConditions conditions,
              OcclusionModelRun& run)
@@ -74,17 +34,19 @@ class Contestant {
   /// The first map -> odom of the filter.
   const std::optional<TimedPose>& start() const { return start_; }
 
-  void add_odometry(const OdometrySample& sample) {
+  bool wants_clouds() const override { return wants_clouds_; }
+
+  void add_odometry(const OdometrySample& sample) override {
     localization_->add_odometry(sample);
     take_outputs();
   }
 
   void add_cloud(Stamp stamp, const PointCloud& cloud, const Eigen::Isometry3d& sensor_in_base,
-                 const Pose2& base_in_odom) {
-    if (wants_clouds_) occlusion_->add_cloud(stamp, cloud, sensor_in_base, to_isometry(base_in_odom));
+                 const Pose2& base_in_odom) override {
+    occlusion_->add_cloud(stamp, cloud, sensor_in_base, to_isometry(base_in_odom));
   }
 
-  void add_epoch(const Epoch& epoch, const Pose2& base_in_odom) {
+  void add_epoch(const DriveEpoch& epoch, const Pose2& base_in_odom) override {
     occlusion_->set_satellites(epoch.stamp, epoch.satellites, epoch.angle_resolution_rad);
     if (!epoch.fix) return;
     const Eigen::Matrix2d claimed = epoch.fix->covariance.topLeftCorner<2, 2>();
@@ -136,110 +98,24 @@ class Contestant {
   std::optional<TimedPose> start_;
 };
 
-/// Sorts the simulator's events, and holds back clouds and epochs until odometry has reached them.
-class Experiment {
- public:
-  Experiment(const Scenario& scenario, const OcclusionExperimentConditions& conditions, OcclusionRun& run)
-      : sensor_in_base_(Eigen::Isometry3d(Eigen::Translation3d(scenario.lidar.mount()))),
-        cloud_every_(scenario.lidar.type == LidarType::kSpinning ? std::max(1, conditions.cloud_every) : 1),
-        run_(run) {
-    for (std::size_t i = 0; i < kComparedModels.size(); ++i) {
-      contestants_.push_back(std::make_unique<Contestant>(kComparedModels[i], scenario, conditions, run.models[i]));
-    }
-  }
-
-  void handle(const std::vector<SimulationEvent>& events) {
-    for (const SimulationEvent& event : events) {
-      stamp_ = event.stamp;
-      std::visit([this](const auto& content) { add(content); }, event.content);
-    }
-    work();
-  }
-
-  void finish() {
-    const auto& start = contestants_.front()->start();
-    if (!start) return;
-    for (const TimedPose& pose : odometry_) {
-      if (pose.stamp >= start->stamp) run_.odometry.push_back({pose.stamp, compose(start->pose, pose.pose)});
-    }
-  }
-
- private:
-  void add(const TruthEvent& truth) { run_.truth.push_back({stamp_, truth.pose}); }
-  void add(const OdometryEvent& odometry) {
-    odometry_.push_back({stamp_, odometry.pose});
-    for (const auto& contestant : contestants_) contestant->add_odometry({stamp_, odometry.pose, odometry.twist});
-  }
-  void add(const ImuMessage&) {}
-  void add(const LidarScan& scan) {
-    if (scans_++ % cloud_every_ == 0) clouds_.emplace_back(stamp_, to_point_cloud(scan));
-  }
-  void add(const FixEvent& event) {
-    if (event.published.publisher != 0) return;
-    Epoch& epoch = epoch_at_stamp();
-    if (event.published.has_fix && event.published.fix.position.allFinite()) epoch.fix = event.published.fix;
-  }
-  void add(const FixTruthEvent& truth) { epoch_at_stamp().error_m = truth.error.head<2>(); }
-  void add(const SatellitesEvent& event) {
-    Epoch& epoch = epoch_at_stamp();
-    epoch.satellites = to_observations(event.satellites);
-    epoch.angle_resolution_rad = event.angle_resolution_rad;
-  }
-  void add(const SignalsEvent& event) {
-    Epoch& epoch = epoch_at_stamp();
-    for (const SignalTruth& signal : event.signals) epoch.has_line_of_sight.push_back(signal.has_line_of_sight);
-  }
-
-  Epoch& epoch_at_stamp() {
-    if (epochs_.empty() || epochs_.back().stamp != stamp_) {
-      epochs_.emplace_back();
-      epochs_.back().stamp = stamp_;
-    }
-    return epochs_.back();
-  }
-
-  void work() {
-    if (odometry_.empty()) return;
-    const Stamp reached = odometry_.back().stamp;
-    for (; !clouds_.empty() && clouds_.front().first <= reached; clouds_.pop_front()) {
-      const auto& [stamp, cloud] = clouds_.front();
-      const auto base = interpolate(odometry_, stamp, kOdometryGap);
-      if (!base) continue;
-      for (const auto& contestant : contestants_) contestant->add_cloud(stamp, cloud, sensor_in_base_, base->pose);
-    }
-    for (; !epochs_.empty() && epochs_.front().stamp <= reached; epochs_.pop_front()) {
-      const auto base = interpolate(odometry_, epochs_.front().stamp, kOdometryGap);
-      if (!base) continue;
-      for (const auto& contestant : contestants_) contestant->add_epoch(epochs_.front(), base->pose);
-    }
-  }
-
-  Eigen::Isometry3d sensor_in_base_;
-  int cloud_every_;
-  OcclusionRun& run_;
-  std::vector<std::unique_ptr<Contestant>> contestants_;
-  Stamp stamp_{0};  ///< of the event at hand
-  int scans_{0};
-  Trajectory odometry_;  ///< in the odometry frame
-  std::deque<std::pair<Stamp, PointCloud>> clouds_;
-  std::deque<Epoch> epochs_;
-};
-
 }  // namespace
 
 OcclusionRun run_occlusion_experiment(const Scenario& scenario, const OcclusionExperimentConditions& conditions,
                                       const std::function<void(double)>& on_progress) {
   OcclusionRun run;
-  CitySimulator simulator(scenario);
-  Experiment experiment(scenario, conditions, run);
-  std::vector<SimulationEvent> events;
-  while (!simulator.is_finished()) {
-    events.clear();
-    simulator.step(std::nullopt, events);
-    experiment.handle(events);
-    on_progress(simulator.progress());
+  std::vector<std::unique_ptr<Contestant>> contestants;
+  std::vector<DriveParticipant*> participants;
+  for (std::size_t i = 0; i < kComparedModels.size(); ++i) {
+    contestants.push_back(std::make_unique<Contestant>(kComparedModels[i], scenario, conditions, run.models[i]));
+    participants.push_back(contestants.back().get());
   }
-  experiment.finish();
+  DriveRecord record = drive_city(scenario, conditions.cloud_every, participants, on_progress);
+  run.truth = std::move(record.truth);
+  if (const auto& start = contestants.front()->start()) {
+    for (const TimedPose& pose : record.odometry) {
+      if (pose.stamp >= start->stamp) run.odometry.push_back({pose.stamp, compose(start->pose, pose.pose)});
+    }
+  }
   return run;
 }
 
