@@ -41,9 +41,9 @@ void count_particles(benchmark::State& state) { state.SetItemsProcessed(state.it
 void BM_PaperStep(benchmark::State& state) {
   ParticleFilterParameters parameters;
   parameters.particle_count = static_cast<int>(state.range(0));
-  parameters.direct_sigma = 0.05;
-  parameters.shadow_sigma = 0.316;
-  parameters.use_fix_covariance = false;
+  parameters.fix.direct_sigma = 0.05;
+  parameters.fix.shadow_sigma = 0.316;
+  parameters.fix.use_fix_covariance = false;
   parameters.cluster_cell = 0.5;
   ParticleFilter filter(parameters, paper_motion());
   filter.initialize({});

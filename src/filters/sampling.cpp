@@ -1,12 +1,16 @@
 #include "urban_gnss_localization/filters/sampling.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <numeric>
 #include <utility>
 
 namespace urban_gnss {
+namespace {
 
-void sample_motion(ParticleSet& particles, const MotionStep& step, RandomEngine& engine) {
+/// `errors_of(i)` are the odometry's errors of particle i.
+template <class ErrorsOf>
+void sample_motion_with(ParticleSet& particles, const MotionStep& step, RandomEngine& engine, ErrorsOf errors_of) {
   const std::size_t count = particles.size();
   const double dt = step.duration_s;
   const bool steered = step.model == MotionModel::kBicycle;
@@ -15,17 +19,50 @@ void sample_motion(ParticleSet& particles, const MotionStep& step, RandomEngine&
     const double speed = step.twist.speed_mps + step.speed_sigma * draw_normal(engine);
     const double input_noise = step.input_sigma * draw_normal(engine);
     const double yaw_noise = step.yaw_rate_sigma * draw_normal(engine);
-    const double rate = steered ? speed * inverse_wheelbase * std::tan(step.steering_rad + input_noise)
-                                : step.twist.yaw_rate_radps + input_noise;
+    const OdometryErrors errors = errors_of(i);
+    const double rate = (steered ? speed * inverse_wheelbase * std::tan(step.steering_rad + input_noise)
+                                 : step.twist.yaw_rate_radps + input_noise) +
+                        errors.yaw_rate_bias_radps;
     const double half_turn = 0.5 * rate * dt;
     const double sinc =
         std::abs(half_turn) < 1e-4 ? 1.0 - half_turn * half_turn / 6.0 : std::sin(half_turn) / half_turn;
-    const double chord = speed * dt * sinc;
+    const double chord = (speed + errors.speed_scale * step.twist.speed_mps) * dt * sinc;
     const double direction = particles.yaw[i] + half_turn;
     particles.x[i] += chord * std::cos(direction);
     particles.y[i] += chord * std::sin(direction);
     particles.yaw[i] = wrap_angle(particles.yaw[i] + rate * dt + yaw_noise * dt);
   }
+}
+
+void add_noise(std::vector<double>& values, double sigma, RandomEngine& engine) {
+  if (sigma <= 0.0) return;
+  for (double& value : values) value += sigma * draw_normal(engine);
+}
+
+}  // namespace
+
+void sample_motion(ParticleSet& particles, const MotionStep& step, RandomEngine& engine) {
+  sample_motion_with(particles, step, engine, [](std::size_t) { return OdometryErrors{}; });
+}
+
+void sample_motion(ParticleSet& particles, const OdometryErrorSet& errors, const MotionStep& step,
+                   RandomEngine& engine) {
+  sample_motion_with(particles, step, engine, [&errors](std::size_t i) {
+    return OdometryErrors{errors.speed_scale[i], errors.yaw_rate_bias[i]};
+  });
+}
+
+void OdometryErrorSet::draw(const OdometryErrorParameters& parameters, RandomEngine& engine) {
+  std::fill(speed_scale.begin(), speed_scale.end(), 0.0);
+  std::fill(yaw_rate_bias.begin(), yaw_rate_bias.end(), 0.0);
+  add_noise(speed_scale, parameters.speed_scale_sigma, engine);
+  add_noise(yaw_rate_bias, parameters.yaw_rate_bias_sigma, engine);
+}
+
+void OdometryErrorSet::walk(double duration_s, const OdometryErrorParameters& parameters, RandomEngine& engine) {
+  const double root_s = std::sqrt(duration_s);
+  add_noise(speed_scale, parameters.speed_scale_walk * root_s, engine);
+  add_noise(yaw_rate_bias, parameters.yaw_rate_bias_walk * root_s, engine);
 }
 
 RingSampler::RingSampler(std::size_t particle_count, double share)

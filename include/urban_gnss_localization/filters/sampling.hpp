@@ -4,13 +4,30 @@
 #include <vector>
 
 #include "urban_gnss_localization/filters/particle_set.hpp"
-#include "urban_gnss_localization/motion/motion_model.hpp"
+#include "urban_gnss_localization/motion/odometry_errors.hpp"
 
 namespace urban_gnss {
 
 /// Eq. (46) and the first line of (22): moves every particle by the noisy motion of eq. (8). The array form of
 /// `move_noisily`, without allocation.
 void sample_motion(ParticleSet& particles, const MotionStep& step, RandomEngine& engine);
+
+/// The odometry's errors as each particle takes them to be, as arrays beside its pose.
+struct OdometryErrorSet {
+  std::vector<double> speed_scale;    ///< 1
+  std::vector<double> yaw_rate_bias;  ///< rad/s
+
+  explicit OdometryErrorSet(std::size_t count) : speed_scale(count), yaw_rate_bias(count) {}
+
+  /// Draws them anew about 0.
+  void draw(const OdometryErrorParameters& parameters, RandomEngine& engine);
+  /// Their random walk over `duration_s`.
+  void walk(double duration_s, const OdometryErrorParameters& parameters, RandomEngine& engine);
+};
+
+/// The same with the odometry freed of each particle's own errors.
+void sample_motion(ParticleSet& particles, const OdometryErrorSet& errors, const MotionStep& step,
+                   RandomEngine& engine);
 
 /// The ring part of the proposal, eq. (22)-(26): a share of the particles, chosen at random, is drawn anew on a ring of
 /// the bias's length about the predicted pose.

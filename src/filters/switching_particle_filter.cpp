@@ -1,0 +1,268 @@
+#include "urban_gnss_localization/filters/switching_particle_filter.hpp"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "urban_gnss_localization/filters/unscented.hpp"
+#include "urban_gnss_localization/gnss/chi_squared.hpp"
+
+namespace urban_gnss {
+namespace {
+
+constexpr int kFixDof = 2;
+constexpr double kReportedQuantile = 0.99;
+constexpr double kResamplingShare = 0.5;
+constexpr std::size_t kOutlier = kContinuations;
+constexpr BiasMode kModes[kContinuations] = {BiasMode::kDirect, BiasMode::kSlow, BiasMode::kFast, BiasMode::kJump};
+
+/// The continuation where the cumulated weights exceed `target`; the last one that has any weight where rounding
+/// leaves none.
+template <class Weight>
+std::size_t choose(Weight weight, std::size_t count, double target, double& rest) {
+  std::size_t last = 0;
+  rest = 0.0;
+  for (std::size_t j = 0; j < count; ++j) {
+    const double w = weight(j);
+    if (w > 0.0 && target < w) {
+      rest = target / w;
+      return j;
+    }
+    if (w > 0.0) last = j;
+    target -= w;
+  }
+  return last;
+}
+
+BiasState corrected(const BiasState& predicted, const Eigen::Vector2d& difference, double noise_variance) {
+  const double gain = predicted.variance / (predicted.variance + noise_variance);
+  return {predicted.mean + gain * (difference - predicted.mean), (1.0 - gain) * predicted.variance};
+}
+
+}  // namespace
+
+ParticleContinuation continue_particle(const Pose2& pose, BiasMode mode, const BiasState& bias, const SwitchingFix& fix,
+                                       const ModeTransition& transition, const BiasModeParameters& parameters,
+                                       double draw) {
+  const Eigen::Vector2d difference = fix.position - transform_point(pose, fix.antenna_in_body);
+  const auto row = transition.row(static_cast<int>(index_of(mode)));
+  double weight[kContinuations + 1];
+  double sum = weight[kOutlier] = parameters.outlier_density();
+  for (std::size_t j = 0; j < kContinuations; ++j) {
+    const BiasState predicted = predict_bias(bias, mode, kModes[j], fix.elapsed_s, parameters);
+    const double variance =
+        predicted.variance + (kModes[j] == BiasMode::kDirect ? fix.direct_variance : fix.shadow_variance);
+    const double density =
+        std::exp(-0.5 * (difference - predicted.mean).squaredNorm() / variance) / (2.0 * kPi * variance);
+    sum += weight[j] = (1.0 - parameters.outlier_share) * row[static_cast<int>(j)] * density;
+  }
+  ParticleContinuation next;
+  next.log_likelihood = std::log(sum);
+  double rest = 0.0;
+  std::size_t chosen = choose([&](std::size_t j) { return weight[j]; }, kContinuations + 1, draw * sum, rest);
+  next.is_outlier = chosen == kOutlier;
+  if (next.is_outlier) {
+    chosen = choose([&](std::size_t j) { return row[static_cast<int>(j)]; }, kContinuations, rest, rest);
+  }
+  next.mode = lasting(kModes[chosen]);
+  next.bias = predict_bias(bias, mode, kModes[chosen], fix.elapsed_s, parameters);
+  if (!next.is_outlier && next.mode != BiasMode::kDirect) {
+    next.bias = corrected(next.bias, difference, fix.shadow_variance);
+  }
+  return next;
+}
+
+SwitchingParticleFilter::SwitchingParticleFilter(const ParticleFilterParameters& parameters,
+                                                 const MotionParameters& motion)
+    : ParticleLocalizer(static_cast<std::size_t>(parameters.particle_count), parameters.cluster_cell),
+      parameters_(parameters),
+      motion_(motion),
+      nis_threshold_(chi_squared_quantile(kReportedQuantile, kFixDof)),
+      resampler_(particles_.size(), ResamplingScheme::kSystematic),
+      biases_(particles_.size()),
+      errors_(particles_.size()),
+      modes_before_(particles_.size()),
+      is_outlier_(particles_.size()) {
+  initialize({});
+}
+
+void SwitchingParticleFilter::initialize(const PoseEstimate& start) {
+  if (!is_finite(start.pose) || !start.covariance.allFinite()) {
+    throw std::invalid_argument("particle_filter: the pose to start from is not finite");
+  }
+  engine_ = make_engine(static_cast<std::uint64_t>(parameters_.seed));
+  particles_.draw_gaussian(start, engine_);
+  errors_.draw(parameters_.odometry, engine_);
+  biases_ = BiasSet(particles_.size());
+  mean_errors_ = {};
+  estimate_ = start.pose;
+  bias_odds_ = 1.0;
+  last_fix_s_.reset();
+  moved_s_ = 0.0;
+  clusters_.find(particles_);
+  effective_sample_size_ = urban_gnss::effective_sample_size(particles_);
+}
+
+void SwitchingParticleFilter::move(const Twist2& twist, double duration_s) {
+  if (!std::isfinite(twist.speed_mps) || !std::isfinite(twist.yaw_rate_radps) || !std::isfinite(duration_s) ||
+      duration_s <= 0.0) {
+    return;
+  }
+  moved_s_ += duration_s;
+  if (is_parked(twist)) {
+    const double sigma = parameters_.odometry.parked_walk * std::sqrt(duration_s);
+    if (sigma <= 0.0) return;
+    for (std::size_t i = 0; i < particles_.size(); ++i) {
+      particles_.x[i] += sigma * draw_normal(engine_);
+      particles_.y[i] += sigma * draw_normal(engine_);
+    }
+    return;
+  }
+  errors_.walk(duration_s, parameters_.odometry, engine_);
+  sample_motion(particles_, errors_, make_motion_step(twist, duration_s, motion_, parameters_.odometry), engine_);
+  estimate_ = urban_gnss::move(estimate_, urban_gnss::corrected(twist, mean_errors_), duration_s);
+}
+
+FixVerdict SwitchingParticleFilter::correct(const FixMeasurement& fix) {
+  FixVerdict verdict;
+  if (!fix.position.allFinite() || !fix.antenna_in_body.allFinite() || !std::isfinite(fix.time_s) ||
+      !is_positive_definite<2>(fix.covariance)) {
+    verdict.decision = FixDecision::kRejectedNonFinite;
+    verdict.reason = "position, time or covariance cannot be used";
+    return verdict;
+  }
+  SwitchingFix seen;
+  seen.position = fix.position;
+  seen.antenna_in_body = fix.antenna_in_body;
+  seen.direct_variance = 0.5 * parameters_.fix.direct_covariance(fix.covariance).trace();
+  seen.shadow_variance = 0.5 * parameters_.fix.shadow_covariance(fix.covariance).trace();
+  seen.elapsed_s = last_fix_s_ ? std::max(fix.time_s - *last_fix_s_, 0.0) : moved_s_;
+  last_fix_s_ = fix.time_s;
+  examine(fix, verdict);
+
+  continue_all(seen);
+  if (!particles_.normalise()) {
+    verdict.decision = FixDecision::kRejectedDegenerate;
+    verdict.reason = "no particle has a usable weight; weights set equal";
+    return verdict;
+  }
+  double outliers = 0.0;
+  for (std::size_t i = 0; i < particles_.size(); ++i) outliers += is_outlier_[i] * particles_.weight[i];
+  verdict.decision = mode_probabilities()[0] >= 0.5 ? FixDecision::kAccepted : FixDecision::kBiasCompensated;
+  if (outliers > 0.5) {
+    verdict.decision = FixDecision::kInflated;
+    verdict.reason = "outlier, probability " + std::to_string(outliers);
+  }
+
+  effective_sample_size_ = urban_gnss::effective_sample_size(particles_);
+  update_estimate();
+  if (effective_sample_size_ < kResamplingShare * static_cast<double>(particles_.size())) {
+    resampler_.resample(particles_, engine_);
+    for (auto* values : {&biases_.x, &biases_.y, &biases_.variance, &errors_.speed_scale, &errors_.yaw_rate_bias}) {
+      resampler_.gather(*values);
+    }
+    const std::vector<std::uint32_t>& parents = resampler_.parents();
+    for (std::size_t i = 0; i < parents.size(); ++i) modes_before_[i] = biases_.mode[parents[i]];
+    biases_.mode.swap(modes_before_);
+  }
+  return verdict;
+}
+
+void SwitchingParticleFilter::continue_all(const SwitchingFix& fix) {
+  const BiasModeParameters& p = parameters_.modes;
+  const ModeTransition transition = mode_transition(fix.elapsed_s, p, bias_odds_);
+  const double log_2pi = std::log(2.0 * kPi);
+  const double log_outlier = std::log(p.outlier_density());  // -infinity where there are none
+  Eigen::Matrix<double, kLastingModes, kContinuations> log_prior =
+      transition.array().log() + (std::log1p(-p.outlier_share) - log_2pi);  // and the density's constant
+
+  // What a continuation begins with does not depend on the particle, but for the bias that goes on.
+  double noise[kContinuations];
+  double begun[kLastingModes][kContinuations];      // variance of the difference
+  double log_begun[kLastingModes][kContinuations];  // its logarithm
+  for (std::size_t m = 0; m < kLastingModes; ++m) {
+    for (std::size_t j = 0; j < kContinuations; ++j) {
+      noise[j] = kModes[j] == BiasMode::kDirect ? fix.direct_variance : fix.shadow_variance;
+      begun[m][j] = predict_bias({}, kModes[m], kModes[j], fix.elapsed_s, p).variance + noise[j];
+      log_begun[m][j] = std::log(begun[m][j]);
+    }
+  }
+  const bool has_lever = !fix.antenna_in_body.isZero(0.0);
+  for (std::size_t i = 0; i < particles_.size(); ++i) {
+    const std::size_t m = index_of(biases_.mode[i]);
+    Eigen::Vector2d difference(fix.position.x() - particles_.x[i], fix.position.y() - particles_.y[i]);
+    if (has_lever) difference = fix.position - transform_point(particles_.pose(i), fix.antenna_in_body);
+    const Eigen::Vector2d mean(biases_.x[i], biases_.y[i]);  // 0 in the direct mode
+    const double without = 0.5 * difference.squaredNorm();
+    const double with = 0.5 * (difference - mean).squaredNorm();
+    const double variance = biases_.variance[i];
+
+    double exponent[kContinuations + 1];
+    double largest = exponent[kOutlier] = log_outlier;
+    for (std::size_t j = 0; j < kContinuations; ++j) {
+      const bool goes_on = m != 0 && (kModes[j] == BiasMode::kSlow || kModes[j] == BiasMode::kFast);
+      const double s = goes_on ? variance + begun[m][j] : begun[m][j];
+      const double log_s = goes_on ? std::log(s) : log_begun[m][j];
+      exponent[j] = log_prior(static_cast<int>(m), static_cast<int>(j)) - log_s - (goes_on ? with : without) / s;
+      largest = std::max(largest, exponent[j]);
+    }
+    double sum = 0.0;
+    for (double& e : exponent) sum += e = std::exp(e - largest);
+    particles_.log_weight[i] += largest + std::log(sum);
+
+    double rest = 0.0;
+    std::size_t chosen =
+        choose([&](std::size_t j) { return exponent[j]; }, kContinuations + 1, draw_uniform(engine_) * sum, rest);
+    is_outlier_[i] = chosen == kOutlier;
+    if (is_outlier_[i]) {
+      chosen = choose([&](std::size_t j) { return transition(static_cast<int>(m), static_cast<int>(j)); },
+                      kContinuations, rest, rest);
+    }
+    const BiasMode to = kModes[chosen];
+    BiasState next = predict_bias({mean, variance}, biases_.mode[i], to, fix.elapsed_s, p);
+    if (!is_outlier_[i] && to != BiasMode::kDirect) next = corrected(next, difference, fix.shadow_variance);
+    biases_.mode[i] = lasting(to);
+    biases_.x[i] = next.mean.x();
+    biases_.y[i] = next.mean.y();
+    biases_.variance[i] = next.variance;
+  }
+}
+
+void SwitchingParticleFilter::examine(const FixMeasurement& fix, FixVerdict& verdict) const {
+  const Eigen::Matrix2d spread = covariance_about(particles_, estimate_).topLeftCorner<2, 2>();
+  const Eigen::Vector2d innovation = fix.position - transform_point(estimate_, fix.antenna_in_body);
+  const Eigen::Matrix2d covariance = spread + parameters_.fix.direct_covariance(fix.covariance);
+  verdict.nis = innovation.dot(covariance.ldlt().solve(innovation));
+  verdict.nis_dof = kFixDof;
+  verdict.nis_threshold = nis_threshold_;
+}
+
+void SwitchingParticleFilter::update_estimate() {
+  clusters_.find(particles_);
+  estimate_ = parameters_.estimate == EstimateMethod::kHeaviestCluster ? clusters_.heaviest_mean(particles_)
+                                                                       : circular_mean(particles_);
+  mean_errors_ = {};
+  for (std::size_t i = 0; i < particles_.size(); ++i) {
+    mean_errors_.speed_scale += particles_.weight[i] * errors_.speed_scale[i];
+    mean_errors_.yaw_rate_bias_radps += particles_.weight[i] * errors_.yaw_rate_bias[i];
+  }
+}
+
+ModeProbabilities SwitchingParticleFilter::mode_probabilities() const {
+  ModeProbabilities probabilities = ModeProbabilities::Zero();
+  for (std::size_t i = 0; i < particles_.size(); ++i) {
+    probabilities[static_cast<int>(index_of(biases_.mode[i]))] += particles_.weight[i];
+  }
+  return probabilities;
+}
+
+std::unique_ptr<ParticleLocalizer> make_particle_filter(const ParticleFilterParameters& parameters,
+                                                        const MotionParameters& motion) {
+  if (parameters.mode == ParticleFilterMode::kSwitching) {
+    return std::make_unique<SwitchingParticleFilter>(parameters, motion);
+  }
+  return std::make_unique<ParticleFilter>(parameters, motion);
+}
+
+}  // namespace urban_gnss
