@@ -53,7 +53,7 @@ bool is_usable(const FixMeasurement& fix) {
 }  // namespace
 
 ImmEkf::ImmEkf(const ImmEkfParameters& parameters, const MotionParameters& motion)
-    : parameters_(parameters), motion_(motion), nis_threshold_(chi_squared_quantile(kReportedQuantile, kFixDof)) {
+    : parameters_(parameters), motion_(motion), nis_threshold_(chi_squared_quantile(kReportedQuantile, kFixDof)), noise_(parameters.noise) {
   initialize({});
 }
 
@@ -67,6 +67,7 @@ void ImmEkf::initialize(const PoseEstimate& start) {
   filters_.fill(first);
   probability_ << 1.0, 0.0, 0.0;
   bias_odds_ = 1.0;
+  noise_.restart();
   last_fix_s_.reset();
   moved_s_ = 0.0;
 }
@@ -77,6 +78,7 @@ void ImmEkf::move(const Twist2& twist, double duration_s) {
     return;
   }
   moved_s_ += duration_s;
+  noise_.move(twist, duration_s);
   const MotionStep motion = make_motion_step(twist, duration_s, motion_, parameters_.odometry);
   for (Gaussian& filter : filters_) {
     const DeadReckoningStep step =
@@ -101,7 +103,11 @@ Gaussian ImmEkf::mixed_into(BiasMode to, const ModeTransition& transition, doubl
     const bool goes_on = from != BiasMode::kDirect && (to == BiasMode::kSlow || to == BiasMode::kFast);
     Gaussian& part = parts[i];
     if (goes_on) {
-      part.covariance.diagonal().tail<2>().array() += bias_growth(to, elapsed_s, parameters_.modes);
+      const double fade = parameters_.modes.bias_fade_time > 0 ? std::exp(-elapsed_s / parameters_.modes.bias_fade_time) : 1.0;
+      part.mean.tail<2>() *= fade;
+      part.covariance.rightCols<2>() *= fade;
+      part.covariance.bottomRows<2>() *= fade;
+      part.covariance.diagonal().tail<2>().array() += bias_growth(to, elapsed_s, parameters_.modes) + (1.0 - fade * fade) * parameters_.modes.fade_sigma * parameters_.modes.fade_sigma;
     } else {
       const BiasState begun = predict_bias({}, from, to, elapsed_s, parameters_.modes);
       part.mean.tail<2>() = begun.mean;
@@ -115,7 +121,8 @@ Gaussian ImmEkf::mixed_into(BiasMode to, const ModeTransition& transition, doubl
   return match_moments(parts, weights);
 }
 
-double ImmEkf::update(BiasMode mode, const FixMeasurement& fix, Continuation& continuation, double& outlier) const {
+double ImmEkf::update(BiasMode mode, const FixMeasurement& fix, Continuation& continuation, double& outlier,
+                      double& white_nis) const {
   Gaussian& state = continuation.state;
   const Eigen::Vector2d predicted = transform_point(pose_of(state.mean), fix.antenna_in_body);
   const Eigen::Vector2d lever = predicted - state.mean.head<2>();
@@ -128,12 +135,22 @@ double ImmEkf::update(BiasMode mode, const FixMeasurement& fix, Continuation& co
   const Eigen::Vector2d innovation =
       fix.position - predicted - (is_direct ? Eigen::Vector2d::Zero().eval() : Eigen::Vector2d(state.mean.tail<2>()));
   const Eigen::Matrix<double, kDimension, 2> with_fix = state.covariance * h.transpose();
-  const Eigen::Matrix2d s = h * with_fix + (is_direct ? parameters_.fix.direct_covariance(fix.covariance)
-                                                      : parameters_.fix.shadow_covariance(fix.covariance));
+  const Eigen::Matrix2d white = noise_.scale() * (is_direct ? parameters_.fix.direct_covariance(fix.covariance)
+                                                            : parameters_.fix.shadow_covariance(fix.covariance));
+  const Eigen::Matrix2d hph = h * with_fix;
+  white_nis = innovation.dot((hph + white).inverse() * innovation);
+  // Direct reception has the heavy tails of Student's t: a fix that is far off is one of larger noise.
+  const double dof = parameters_.modes.student_dof;
+  const double tail_dof = is_direct ? dof : 1e6;
+  const double inflation = noise_.correlation_inflation(fix.time_s);
+  const double weight = std::min(1.0, (tail_dof + kFixDof) / (tail_dof + white_nis));
+  const Eigen::Matrix2d plain = hph + inflation * white;
+  const double nis = innovation.dot(plain.inverse() * innovation);
+  const Eigen::Matrix2d s = hph + inflation / weight * white;
   const Eigen::Matrix2d s_inverse = s.inverse();
-  const double nis = innovation.dot(s_inverse * innovation);
-  const double log_used =
-      std::log1p(-parameters_.modes.outlier_share) - 0.5 * nis - std::log(2.0 * kPi) - 0.5 * std::log(s.determinant());
+  const double log_used = std::log1p(-parameters_.modes.outlier_share) -
+                          0.5 * (tail_dof + kFixDof) * std::log1p(nis / tail_dof) - std::log(2.0 * kPi) -
+                          0.5 * std::log(plain.determinant());
   const double log_outlier = std::log(parameters_.modes.outlier_density());  // -infinity where there are none
   continuation.log_weight = std::max(log_used, log_outlier) + std::log1p(std::exp(-std::abs(log_used - log_outlier)));
 
@@ -162,13 +179,14 @@ FixVerdict ImmEkf::correct(const FixMeasurement& fix) {
   const Eigen::Vector4d prior = transition.transpose() * probability_;
   std::array<Continuation, kContinuations> next;
   std::array<double, kContinuations> outlier{};
+  std::array<double, kContinuations> white_nis{};
   std::array<double, kContinuations> posterior{};
   double largest = -std::numeric_limits<double>::infinity();
   bool is_finite = true;
   for (std::size_t j = 0; j < kContinuations; ++j) {
     next[j].prior = prior[static_cast<int>(j)];
     next[j].state = mixed_into(kModes[j], transition, elapsed_s);
-    const double nis = update(kModes[j], fix, next[j], outlier[j]);
+    const double nis = update(kModes[j], fix, next[j], outlier[j], white_nis[j]);
     if (kModes[j] == BiasMode::kDirect) verdict.nis = nis;
     is_finite = is_finite && next[j].state.mean.allFinite() && next[j].state.covariance.allFinite();
     posterior[j] = std::log(next[j].prior) + next[j].log_weight;
@@ -184,7 +202,12 @@ FixVerdict ImmEkf::correct(const FixMeasurement& fix) {
   double sum = 0.0;
   for (double& p : posterior) sum += p = std::exp(p - largest);
   double any_outlier = 0.0;
-  for (std::size_t j = 0; j < kContinuations; ++j) any_outlier += (posterior[j] /= sum) * outlier[j];
+  double exceeding = 0.0;
+  for (std::size_t j = 0; j < kContinuations; ++j) {
+    any_outlier += (posterior[j] /= sum) * outlier[j];
+    if (white_nis[j] > FixNoiseModel::kMedianNis) exceeding += posterior[j];
+  }
+  noise_.learn(fix.time_s, exceeding);
 
   constexpr std::size_t kSlow = index_of(BiasMode::kSlow);
   constexpr std::size_t kJump = index_of(BiasMode::kJump);

@@ -55,6 +55,8 @@ struct BiasModeParameters {
   double fast_bias_walk{1.0};    ///< m/sqrt(s) per axis, sqrt(q_f)
   double jump_sigma{20.0};       ///< m per axis, sigma_J, of a bias that came at once
   double onset_sigma{0.5};       ///< m per axis, of a bias that begins without a jump
+  double student_dof{1.0};       ///< degrees of freedom of the noise in direct reception; large ones are Gaussian
+  double bias_fade_time{0.0}; double fade_sigma{0.0};
   double outlier_share{0.01};    ///< of the fixes, those that say nothing
   double outlier_radius{200.0};  ///< m, within which such a fix is anywhere
 
@@ -69,6 +71,7 @@ struct BiasModeParameters {
     v("fast_bias_walk", fast_bias_walk, non_negative());
     v("jump_sigma", jump_sigma, positive());
     v("onset_sigma", onset_sigma, non_negative());
+    v("student_dof", student_dof, positive()); v("bias_fade_time", bias_fade_time, non_negative()); v("fade_sigma", fade_sigma, non_negative());
     v("outlier_share", outlier_share, between(0.0, 0.5));
     v("outlier_radius", outlier_radius, positive());
   }

@@ -6,18 +6,21 @@
 
 #include "urban_gnss_localization/filters/bias_modes.hpp"
 #include "urban_gnss_localization/filters/dead_reckoning.hpp"
+#include "urban_gnss_localization/filters/fix_noise_model.hpp"
 #include "urban_gnss_localization/filters/localizer.hpp"
 
 namespace urban_gnss {
 
 struct ImmEkfParameters {
   FixSigmaParameters fix;
+  FixNoiseModelParameters noise;
   BiasModeParameters modes;
   OdometryErrorParameters odometry;
 
   template <class V>
   void visit(V& v) {
     fix.visit(v);
+    noise.visit(v);
     modes.visit(v);
     odometry.visit(v);
   }
@@ -80,11 +83,13 @@ class ImmEkf : public Localizer {
   };
   Gaussian mixed_into(BiasMode to, const ModeTransition& transition, double elapsed_s) const;
   /// Takes the fix; returns its NIS. `outlier` becomes the posterior probability that it is one.
-  double update(BiasMode mode, const FixMeasurement& fix, Continuation& continuation, double& outlier) const;
+  double update(BiasMode mode, const FixMeasurement& fix, Continuation& continuation, double& outlier,
+                double& white_nis) const;
 
   ImmEkfParameters parameters_;
   MotionParameters motion_;
   double nis_threshold_;
+  FixNoiseModel noise_;
   std::array<Gaussian, kLastingModes> filters_;
   ModeProbabilities probability_{ModeProbabilities::Zero()};
   double bias_odds_{1.0};
