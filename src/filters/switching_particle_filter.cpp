@@ -93,7 +93,7 @@ void SwitchingParticleFilter::initialize(const PoseEstimate& start) {
   }
   engine_ = make_engine(static_cast<std::uint64_t>(parameters_.seed));
   particles_.draw_gaussian(start, engine_);
-  errors_.draw(parameters_.odometry, engine_);
+  errors_.reset(parameters_.odometry);
   biases_ = BiasSet(particles_.size());
   mean_errors_ = {};
   estimate_ = start.pose;
@@ -119,7 +119,7 @@ void SwitchingParticleFilter::move(const Twist2& twist, double duration_s) {
     }
     return;
   }
-  errors_.walk(duration_s, parameters_.odometry, engine_);
+  errors_.walk(duration_s, parameters_.odometry);
   sample_motion(particles_, errors_, make_motion_step(twist, duration_s, motion_, parameters_.odometry), engine_);
   estimate_ = urban_gnss::move(estimate_, urban_gnss::corrected(twist, mean_errors_), duration_s);
 }
