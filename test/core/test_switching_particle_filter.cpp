@@ -20,6 +20,7 @@ ParticleFilterParameters switching(const std::string& changes = "{}") {
 SwitchingParticleFilter make(const std::string& changes = "{}") { return {switching(changes), {}}; }
 
 TEST(SwitchingParticleFilter, ArraysAgreeWithThePlainForm) {
+  std::map<BiasMode, int> seen;
   for (const char* changes : {"{}", "{outlier_share: 0.0, jump_share: 0.2, direct_time: 3.0, fast_bias_time: 2.0}",
                               "{outlier_share: 0.4, outlier_radius: 3.0, direct_time: 1.0, jump_share: 0.3}"}) {
     const ParticleFilterParameters p = with(switching(changes), "{particle_count: 400, shadow_sigma: 4.0}");
@@ -31,7 +32,6 @@ TEST(SwitchingParticleFilter, ArraysAgreeWithThePlainForm) {
     plain.draw_gaussian(start, engine);
     std::vector<BiasMode> modes(400);
     std::vector<BiasState> biases(400);
-    std::map<BiasMode, int> seen;
     double last_s = 0.0;
     const std::pair<double, Eigen::Vector2d> fixes[] = {
         {0.0, {3.0, -1.0}}, {1.0, {6.0, 1.0}}, {2.5, {6.5, 1.5}}, {3.0, {3.0, -0.5}}, {30.0, {8.0, -5.0}}};
@@ -59,8 +59,8 @@ TEST(SwitchingParticleFilter, ArraysAgreeWithThePlainForm) {
         ASSERT_NEAR(filter.particles().weight[i], plain.weight[i], 1e-12) << i;
       }
     }
-    EXPECT_EQ(seen.size(), kLastingModes) << changes;  // every mode occurred
   }
+  EXPECT_EQ(seen.size(), kLastingModes);  // every mode occurred
 }
 
 /// The sum over the continuations, against one density each and numerical integration over the bias.
@@ -118,11 +118,11 @@ TEST(SwitchingParticleFilter, FindsABiasThatComesAtOnceAndItsEnd) {
 
 /// Two ways to compute one posterior.
 TEST(SwitchingParticleFilter, AgreesWithTheInteractingModels) {
-  for (std::uint64_t seed = 101; seed < 105; ++seed) {
+  for (std::uint64_t seed = 101; seed < 104; ++seed) {
     SwitchingDrive d;
     d.seed = seed;
     d.bias = bias_between(40.0, 80.0, {6.0, 12.0});
-    SwitchingParticleFilter particles = make("particle_count: 4000");
+    SwitchingParticleFilter particles = make();
     ImmEkf imm(ImmEkfParameters{}, {});
     const auto a = drive(particles, d);
     const auto b = drive(imm, d);
@@ -146,14 +146,14 @@ TEST(SwitchingParticleFilter, CovarianceIsHonestF14) {
     d.errors = {0.03 * draw_normal(engine), 0.005 * draw_normal(engine)};
     const double direction = uniform_between(-kPi, kPi, engine);
     d.bias = bias_between(40.0, 90.0, 20.0 * Eigen::Vector2d(std::cos(direction), std::sin(direction)));
-    SwitchingParticleFilter filter = make("particle_count: 2000");
+    SwitchingParticleFilter filter = make();
     for (const auto& step : drive(filter, d)) {
       sum += step.nees / 3.0;
       ++count;
     }
   }
   EXPECT_GT(sum / count, 0.3);
-  EXPECT_LT(sum / count, 2.0);
+  EXPECT_LT(sum / count, 1.6);
 }
 
 TEST(SwitchingParticleFilter, FindsAnUnknownHeadingF16) {
