@@ -6,7 +6,6 @@
 #include <stdexcept>
 
 #include "urban_gnss_localization/filters/dead_reckoning.hpp"
-#include "urban_gnss_localization/filters/unscented.hpp"
 #include "urban_gnss_localization/gnss/chi_squared.hpp"
 
 namespace urban_gnss {
@@ -108,10 +107,7 @@ void SwitchingParticleFilter::initialize(const PoseEstimate& start) {
 }
 
 void SwitchingParticleFilter::move(const Twist2& twist, double duration_s) {
-  if (!std::isfinite(twist.speed_mps) || !std::isfinite(twist.yaw_rate_radps) || !std::isfinite(duration_s) ||
-      duration_s <= 0.0) {
-    return;
-  }
+  if (!is_usable(twist, duration_s)) return;
   moved_s_ += duration_s;
   if (is_parked(twist)) {
     const double sigma = parameters_.odometry.parked_walk * std::sqrt(duration_s);
@@ -129,8 +125,7 @@ void SwitchingParticleFilter::move(const Twist2& twist, double duration_s) {
 
 FixVerdict SwitchingParticleFilter::correct(const FixMeasurement& fix) {
   FixVerdict verdict;
-  if (!fix.position.allFinite() || !fix.antenna_in_body.allFinite() || !std::isfinite(fix.time_s) ||
-      !is_positive_definite<2>(fix.covariance)) {
+  if (!is_usable(fix)) {
     verdict.decision = FixDecision::kRejectedNonFinite;
     verdict.reason = "position, time or covariance cannot be used";
     return verdict;
