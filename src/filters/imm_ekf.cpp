@@ -5,7 +5,6 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "urban_gnss_localization/filters/unscented.hpp"
 #include "urban_gnss_localization/gnss/chi_squared.hpp"
 
 namespace urban_gnss {
@@ -45,11 +44,6 @@ Gaussian match_moments(const std::array<Gaussian, N>& parts, const std::array<do
 
 Pose2 pose_of(const State& state) { return {state[0], state[1], state[kYaw]}; }
 
-bool is_usable(const FixMeasurement& fix) {
-  return fix.position.allFinite() && fix.antenna_in_body.allFinite() && std::isfinite(fix.time_s) &&
-         is_positive_definite<2>(fix.covariance);
-}
-
 }  // namespace
 
 ImmEkf::ImmEkf(const ImmEkfParameters& parameters, const MotionParameters& motion)
@@ -73,10 +67,7 @@ void ImmEkf::initialize(const PoseEstimate& start) {
 }
 
 void ImmEkf::move(const Twist2& twist, double duration_s) {
-  if (!std::isfinite(twist.speed_mps) || !std::isfinite(twist.yaw_rate_radps) || !std::isfinite(duration_s) ||
-      duration_s <= 0.0) {
-    return;
-  }
+  if (!is_usable(twist, duration_s)) return;
   moved_s_ += duration_s;
   noise_.move(twist, duration_s);
   const MotionStep motion = make_motion_step(twist, duration_s, motion_, parameters_.odometry);

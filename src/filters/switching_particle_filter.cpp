@@ -5,7 +5,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "urban_gnss_localization/filters/unscented.hpp"
+#include "urban_gnss_localization/filters/dead_reckoning.hpp"
 #include "urban_gnss_localization/gnss/chi_squared.hpp"
 
 namespace urban_gnss {
@@ -14,6 +14,8 @@ namespace {
 constexpr int kFixDof = 2;
 constexpr double kReportedQuantile = 0.99;
 constexpr double kResamplingShare = 0.5;
+/// Standard deviation of the resampling's kernel, as a share of the cluster's: its variance grows by 4 %.
+constexpr double kKernel = 0.2;
 constexpr std::size_t kOutlier = kContinuations;
 constexpr BiasMode kModes[kContinuations] = {BiasMode::kDirect, BiasMode::kSlow, BiasMode::kFast, BiasMode::kJump};
 
@@ -93,7 +95,7 @@ void SwitchingParticleFilter::initialize(const PoseEstimate& start) {
   }
   engine_ = make_engine(static_cast<std::uint64_t>(parameters_.seed));
   particles_.draw_gaussian(start, engine_);
-  errors_.draw(parameters_.odometry, engine_);
+  errors_.reset(parameters_.odometry);
   biases_ = BiasSet(particles_.size());
   mean_errors_ = {};
   estimate_ = start.pose;
@@ -105,10 +107,7 @@ void SwitchingParticleFilter::initialize(const PoseEstimate& start) {
 }
 
 void SwitchingParticleFilter::move(const Twist2& twist, double duration_s) {
-  if (!std::isfinite(twist.speed_mps) || !std::isfinite(twist.yaw_rate_radps) || !std::isfinite(duration_s) ||
-      duration_s <= 0.0) {
-    return;
-  }
+  if (!is_usable(twist, duration_s)) return;
   moved_s_ += duration_s;
   if (is_parked(twist)) {
     const double sigma = parameters_.odometry.parked_walk * std::sqrt(duration_s);
@@ -119,15 +118,14 @@ void SwitchingParticleFilter::move(const Twist2& twist, double duration_s) {
     }
     return;
   }
-  errors_.walk(duration_s, parameters_.odometry, engine_);
+  errors_.walk(duration_s, parameters_.odometry);
   sample_motion(particles_, errors_, make_motion_step(twist, duration_s, motion_, parameters_.odometry), engine_);
   estimate_ = urban_gnss::move(estimate_, urban_gnss::corrected(twist, mean_errors_), duration_s);
 }
 
 FixVerdict SwitchingParticleFilter::correct(const FixMeasurement& fix) {
   FixVerdict verdict;
-  if (!fix.position.allFinite() || !fix.antenna_in_body.allFinite() || !std::isfinite(fix.time_s) ||
-      !is_positive_definite<2>(fix.covariance)) {
+  if (!is_usable(fix)) {
     verdict.decision = FixDecision::kRejectedNonFinite;
     verdict.reason = "position, time or covariance cannot be used";
     return verdict;
@@ -157,16 +155,50 @@ FixVerdict SwitchingParticleFilter::correct(const FixMeasurement& fix) {
 
   effective_sample_size_ = urban_gnss::effective_sample_size(particles_);
   update_estimate();
-  if (effective_sample_size_ < kResamplingShare * static_cast<double>(particles_.size())) {
-    resampler_.resample(particles_, engine_);
-    for (auto* values : {&biases_.x, &biases_.y, &biases_.variance, &errors_.speed_scale, &errors_.yaw_rate_bias}) {
-      resampler_.gather(*values);
-    }
-    const std::vector<std::uint32_t>& parents = resampler_.parents();
-    for (std::size_t i = 0; i < parents.size(); ++i) modes_before_[i] = biases_.mode[parents[i]];
-    biases_.mode.swap(modes_before_);
-  }
+  if (effective_sample_size_ < kResamplingShare * static_cast<double>(particles_.size())) resample();
   return verdict;
+}
+
+void SwitchingParticleFilter::resample() {
+  // Of the heaviest cluster, before its particles are equal.
+  using Vector5 = Eigen::Matrix<double, kErrorStates, 1>;
+  ErrorCovariance covariance = ErrorCovariance::Zero();
+  double mass = 0.0;
+  for (std::size_t i = 0; i < particles_.size(); ++i) {
+    if (!clusters_.is_in_heaviest(i)) continue;
+    Vector5 offset;
+    offset << particles_.x[i] - estimate_.x, particles_.y[i] - estimate_.y,
+        angle_difference(particles_.yaw[i], estimate_.yaw), errors_.speed_scale[i] - mean_errors_.speed_scale,
+        errors_.yaw_rate_bias[i] - mean_errors_.yaw_rate_bias_radps;
+    covariance += particles_.weight[i] * offset * offset.transpose();
+    mass += particles_.weight[i];
+  }
+
+  resampler_.resample(particles_, engine_);
+  for (auto* values : {&biases_.x, &biases_.y, &biases_.variance, &errors_.speed_scale, &errors_.yaw_rate_bias}) {
+    resampler_.gather(*values);
+  }
+  const std::vector<std::uint32_t>& parents = resampler_.parents();
+  for (std::size_t i = 0; i < parents.size(); ++i) modes_before_[i] = biases_.mode[parents[i]];
+  biases_.mode.swap(modes_before_);
+
+  if (!(mass > 0.0) || !covariance.allFinite()) return;
+  const Eigen::SelfAdjointEigenSolver<ErrorCovariance> axes(covariance / mass);
+  const ErrorCovariance root =
+      kKernel * axes.eigenvectors() * axes.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
+  for (std::size_t i = 0; i < particles_.size(); ++i) {
+    Vector5 draw;
+    for (int axis = 0; axis < kErrorStates; ++axis) draw[axis] = draw_normal(engine_);
+    const Vector5 shift = root * draw;
+    particles_.x[i] += shift[0];
+    particles_.y[i] += shift[1];
+    particles_.yaw[i] = wrap_angle(particles_.yaw[i] + shift[2]);
+    errors_.speed_scale[i] += shift[3];
+    errors_.yaw_rate_bias[i] += shift[4];
+    if (biases_.mode[i] == BiasMode::kDirect) continue;
+    biases_.x[i] -= shift[0];
+    biases_.y[i] -= shift[1];
+  }
 }
 
 void SwitchingParticleFilter::continue_all(const SwitchingFix& fix) {

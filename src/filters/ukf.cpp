@@ -62,10 +62,7 @@ void Ukf::initialize(const PoseEstimate& start) {
 }
 
 void Ukf::move(const Twist2& twist, double duration_s) {
-  if (!std::isfinite(twist.speed_mps) || !std::isfinite(twist.yaw_rate_radps) || !std::isfinite(duration_s) ||
-      duration_s <= 0.0) {
-    return;
-  }
+  if (!is_usable(twist, duration_s)) return;
   if (is_parked(twist)) {
     Covariance covariance = covariance_;
     const double walk = parameters_.odometry.parked_walk;
@@ -145,8 +142,7 @@ Ukf::Prediction Ukf::predict(const Eigen::Vector2d& antenna_in_body) const {
 
 FixVerdict Ukf::correct(const FixMeasurement& fix) {
   FixVerdict verdict;
-  if (!fix.position.allFinite() || !fix.antenna_in_body.allFinite() || !std::isfinite(fix.time_s) ||
-      !is_positive_definite<2>(fix.covariance)) {
+  if (!is_usable(fix)) {
     verdict.decision = FixDecision::kRejectedNonFinite;
     verdict.reason = "position, time or covariance cannot be used";
     return verdict;

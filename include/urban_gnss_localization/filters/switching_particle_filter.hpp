@@ -54,7 +54,10 @@ ParticleContinuation continue_particle(const Pose2& pose, BiasMode mode, const B
 /// (the optimal proposal for the mode); one continuation is drawn, and the bias updated by a scalar Kalman step. A
 /// fix's covariance is taken for isotropic, with its mean variance.
 ///
-/// Resampling is systematic, where the effective sample size is below half of the particles.
+/// Resampling is systematic, where the effective sample size is below half of the particles. It is regularised (Musso,
+/// Oudjane and Le Gland 2001): copies are drawn apart by a Gaussian kernel, a small share of the heaviest cluster's
+/// covariance of pose and odometry errors. Without it a few ancestors are all that is left of what hardly changes; the
+/// odometry's errors do. A particle's bias makes up for the kernel's shift, as a fix sees the sum of both.
 class SwitchingParticleFilter : public ParticleLocalizer {
  public:
   /// Requires parameters without faults.
@@ -82,6 +85,7 @@ class SwitchingParticleFilter : public ParticleLocalizer {
   void continue_all(const SwitchingFix& fix);
   void examine(const FixMeasurement& fix, FixVerdict& verdict) const;
   void update_estimate();
+  void resample();
   ParticleFilterParameters parameters_;
   MotionParameters motion_;
   double nis_threshold_;
