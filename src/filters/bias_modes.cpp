@@ -84,10 +84,15 @@ ModeProbabilities stationary_modes(const BiasModeParameters& p, double bias_odds
   return {late(kS, kS), late(kS, kL) + late(kS, kJ), late(kS, kF)};
 }
 
+double bias_fade(double elapsed_s, const BiasModeParameters& p) {
+  return p.bias_fade_time > 0.0 ? std::exp(-elapsed_s / p.bias_fade_time) : 1.0;
+}
+
 double bias_growth(BiasMode to, double elapsed_s, const BiasModeParameters& p) {
-  if (to == BiasMode::kSlow) return p.slow_bias_walk * p.slow_bias_walk * elapsed_s;
-  if (to == BiasMode::kFast) return p.fast_bias_walk * p.fast_bias_walk * elapsed_s;
-  return 0.0;
+  if (to != BiasMode::kSlow && to != BiasMode::kFast) return 0.0;
+  const double walk = to == BiasMode::kSlow ? p.slow_bias_walk : p.fast_bias_walk;
+  const double fade = bias_fade(elapsed_s, p);
+  return walk * walk * elapsed_s + (1.0 - fade * fade) * p.jump_sigma * p.jump_sigma;
 }
 
 BiasState predict_bias(const BiasState& bias, BiasMode from, BiasMode to, double elapsed_s,
@@ -99,8 +104,9 @@ BiasState predict_bias(const BiasState& bias, BiasMode from, BiasMode to, double
   } else if (from == BiasMode::kDirect) {
     predicted.variance = p.onset_sigma * p.onset_sigma + bias_growth(to, elapsed_s, p);
   } else {
-    predicted.mean = bias.mean;
-    predicted.variance = bias.variance + bias_growth(to, elapsed_s, p);
+    const double fade = bias_fade(elapsed_s, p);
+    predicted.mean = fade * bias.mean;
+    predicted.variance = fade * fade * bias.variance + bias_growth(to, elapsed_s, p);
   }
   return predicted;
 }

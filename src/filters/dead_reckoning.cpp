@@ -83,7 +83,9 @@ DeadReckoningStep dead_reckon(const Pose2& pose, const OdometryErrors& errors, c
   const Eigen::Vector2d sigmas(motion.speed_sigma * dt, motion.input_sigma * dt);
   const Eigen::Matrix<double, 3, 2> root = k * by_input * sigmas.asDiagonal();
   step.noise.topLeftCorner<3, 3>() = root * root.transpose();
-  step.noise(2, 2) += square(motion.yaw_rate_sigma * dt);
+  step.noise(0, 0) += square(p.position_walk) * dt;
+  step.noise(1, 1) += square(p.position_walk) * dt;
+  step.noise(2, 2) += square(motion.yaw_rate_sigma * dt) + square(p.heading_walk) * dt;
   step.noise(3, 3) = square(p.speed_scale_walk) * dt;
   step.noise(4, 4) = square(p.yaw_rate_bias_walk) * dt;
   return step;

@@ -47,7 +47,10 @@ Pose2 pose_of(const State& state) { return {state[0], state[1], state[kYaw]}; }
 }  // namespace
 
 ImmEkf::ImmEkf(const ImmEkfParameters& parameters, const MotionParameters& motion)
-    : parameters_(parameters), motion_(motion), nis_threshold_(chi_squared_quantile(kReportedQuantile, kFixDof)), noise_(parameters.noise) {
+    : parameters_(parameters),
+      motion_(motion),
+      nis_threshold_(chi_squared_quantile(kReportedQuantile, kFixDof)),
+      noise_(parameters.noise) {
   initialize({});
 }
 
@@ -94,11 +97,11 @@ Gaussian ImmEkf::mixed_into(BiasMode to, const ModeTransition& transition, doubl
     const bool goes_on = from != BiasMode::kDirect && (to == BiasMode::kSlow || to == BiasMode::kFast);
     Gaussian& part = parts[i];
     if (goes_on) {
-      const double fade = parameters_.modes.bias_fade_time > 0 ? std::exp(-elapsed_s / parameters_.modes.bias_fade_time) : 1.0;
+      const double fade = bias_fade(elapsed_s, parameters_.modes);
       part.mean.tail<2>() *= fade;
       part.covariance.rightCols<2>() *= fade;
       part.covariance.bottomRows<2>() *= fade;
-      part.covariance.diagonal().tail<2>().array() += bias_growth(to, elapsed_s, parameters_.modes) + (1.0 - fade * fade) * parameters_.modes.fade_sigma * parameters_.modes.fade_sigma;
+      part.covariance.diagonal().tail<2>().array() += bias_growth(to, elapsed_s, parameters_.modes);
     } else {
       const BiasState begun = predict_bias({}, from, to, elapsed_s, parameters_.modes);
       part.mean.tail<2>() = begun.mean;

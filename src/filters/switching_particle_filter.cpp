@@ -37,6 +37,9 @@ std::size_t choose(Weight weight, std::size_t count, double target, double& rest
   return last;
 }
 
+/// Logarithm of the two-dimensional Student's t density over that at its centre, for a squared distance `nis`.
+double log_student(double nis, double dof) { return -0.5 * (dof + kFixDof) * std::log1p(nis / dof); }
+
 BiasState corrected(const BiasState& predicted, const Eigen::Vector2d& difference, double noise_variance) {
   const double gain = predicted.variance / (predicted.variance + noise_variance);
   return {predicted.mean + gain * (difference - predicted.mean), (1.0 - gain) * predicted.variance};
@@ -53,10 +56,11 @@ ParticleContinuation continue_particle(const Pose2& pose, BiasMode mode, const B
   double sum = weight[kOutlier] = parameters.outlier_density();
   for (std::size_t j = 0; j < kContinuations; ++j) {
     const BiasState predicted = predict_bias(bias, mode, kModes[j], fix.elapsed_s, parameters);
-    const double variance =
-        predicted.variance + (kModes[j] == BiasMode::kDirect ? fix.direct_variance : fix.shadow_variance);
-    const double density =
-        std::exp(-0.5 * (difference - predicted.mean).squaredNorm() / variance) / (2.0 * kPi * variance);
+    const bool is_direct = kModes[j] == BiasMode::kDirect;
+    const double variance = predicted.variance + (is_direct ? fix.direct_variance : fix.shadow_variance);
+    const double nis = (difference - predicted.mean).squaredNorm() / variance;
+    const double log_shape = is_direct ? log_student(nis, parameters.student_dof) : -0.5 * nis;
+    const double density = std::exp(log_shape) / (2.0 * kPi * variance);
     sum += weight[j] = (1.0 - parameters.outlier_share) * row[static_cast<int>(j)] * density;
   }
   ParticleContinuation next;
@@ -84,6 +88,7 @@ SwitchingParticleFilter::SwitchingParticleFilter(const ParticleFilterParameters&
       resampler_(particles_.size(), ResamplingScheme::kSystematic),
       biases_(particles_.size()),
       errors_(particles_.size()),
+      noise_(parameters.noise),
       modes_before_(particles_.size()),
       is_outlier_(particles_.size()) {
   initialize({});
@@ -100,6 +105,7 @@ void SwitchingParticleFilter::initialize(const PoseEstimate& start) {
   mean_errors_ = {};
   estimate_ = start.pose;
   bias_odds_ = 1.0;
+  noise_.restart();
   last_fix_s_.reset();
   moved_s_ = 0.0;
   clusters_.find(particles_);
@@ -109,6 +115,7 @@ void SwitchingParticleFilter::initialize(const PoseEstimate& start) {
 void SwitchingParticleFilter::move(const Twist2& twist, double duration_s) {
   if (!is_usable(twist, duration_s)) return;
   moved_s_ += duration_s;
+  noise_.move(twist, duration_s);
   if (is_parked(twist)) {
     const double sigma = parameters_.odometry.parked_walk * std::sqrt(duration_s);
     if (sigma <= 0.0) return;
@@ -120,6 +127,15 @@ void SwitchingParticleFilter::move(const Twist2& twist, double duration_s) {
   }
   errors_.walk(duration_s, parameters_.odometry);
   sample_motion(particles_, errors_, make_motion_step(twist, duration_s, motion_, parameters_.odometry), engine_);
+  const double position_sigma = parameters_.odometry.position_walk * std::sqrt(duration_s);
+  const double heading_sigma = parameters_.odometry.heading_walk * std::sqrt(duration_s);
+  if (position_sigma > 0.0 || heading_sigma > 0.0) {
+    for (std::size_t i = 0; i < particles_.size(); ++i) {
+      particles_.x[i] += position_sigma * draw_normal(engine_);
+      particles_.y[i] += position_sigma * draw_normal(engine_);
+      particles_.yaw[i] = wrap_angle(particles_.yaw[i] + heading_sigma * draw_normal(engine_));
+    }
+  }
   estimate_ = urban_gnss::move(estimate_, urban_gnss::corrected(twist, mean_errors_), duration_s);
 }
 
@@ -133,10 +149,12 @@ FixVerdict SwitchingParticleFilter::correct(const FixMeasurement& fix) {
   SwitchingFix seen;
   seen.position = fix.position;
   seen.antenna_in_body = fix.antenna_in_body;
-  seen.direct_variance = 0.5 * parameters_.fix.direct_covariance(fix.covariance).trace();
-  seen.shadow_variance = 0.5 * parameters_.fix.shadow_covariance(fix.covariance).trace();
+  const double factor = 0.5 * noise_.scale() * noise_.correlation_inflation(fix.time_s);
+  seen.direct_variance = factor * parameters_.fix.direct_covariance(fix.covariance).trace();
+  seen.shadow_variance = factor * parameters_.fix.shadow_covariance(fix.covariance).trace();
   seen.elapsed_s = last_fix_s_ ? std::max(fix.time_s - *last_fix_s_, 0.0) : moved_s_;
   last_fix_s_ = fix.time_s;
+  noise_.learn(fix.time_s, is_beyond_median(fix, seen.elapsed_s) ? 1.0 : 0.0);
   examine(fix, verdict);
 
   continue_all(seen);
@@ -204,6 +222,7 @@ void SwitchingParticleFilter::resample() {
 void SwitchingParticleFilter::continue_all(const SwitchingFix& fix) {
   const BiasModeParameters& p = parameters_.modes;
   const ModeTransition transition = mode_transition(fix.elapsed_s, p, bias_odds_);
+  const double fade = bias_fade(fix.elapsed_s, p);
   const double log_2pi = std::log(2.0 * kPi);
   const double log_outlier = std::log(p.outlier_density());  // -infinity where there are none
   Eigen::Matrix<double, kLastingModes, kContinuations> log_prior =
@@ -227,8 +246,8 @@ void SwitchingParticleFilter::continue_all(const SwitchingFix& fix) {
     if (has_lever) difference = fix.position - transform_point(particles_.pose(i), fix.antenna_in_body);
     const Eigen::Vector2d mean(biases_.x[i], biases_.y[i]);  // 0 in the direct mode
     const double without = 0.5 * difference.squaredNorm();
-    const double with = 0.5 * (difference - mean).squaredNorm();
-    const double variance = biases_.variance[i];
+    const double with = 0.5 * (difference - fade * mean).squaredNorm();
+    const double variance = fade * fade * biases_.variance[i];
 
     double exponent[kContinuations + 1];
     double largest = exponent[kOutlier] = log_outlier;
@@ -236,7 +255,9 @@ void SwitchingParticleFilter::continue_all(const SwitchingFix& fix) {
       const bool goes_on = m != 0 && (kModes[j] == BiasMode::kSlow || kModes[j] == BiasMode::kFast);
       const double s = goes_on ? variance + begun[m][j] : begun[m][j];
       const double log_s = goes_on ? std::log(s) : log_begun[m][j];
-      exponent[j] = log_prior(static_cast<int>(m), static_cast<int>(j)) - log_s - (goes_on ? with : without) / s;
+      const double shape = kModes[j] == BiasMode::kDirect ? log_student(2.0 * without / s, p.student_dof)
+                                                          : -(goes_on ? with : without) / s;
+      exponent[j] = log_prior(static_cast<int>(m), static_cast<int>(j)) - log_s + shape;
       largest = std::max(largest, exponent[j]);
     }
     double sum = 0.0;
@@ -252,13 +273,32 @@ void SwitchingParticleFilter::continue_all(const SwitchingFix& fix) {
                       kContinuations, rest, rest);
     }
     const BiasMode to = kModes[chosen];
-    BiasState next = predict_bias({mean, variance}, biases_.mode[i], to, fix.elapsed_s, p);
+    BiasState next = predict_bias(biases_.bias(i), biases_.mode[i], to, fix.elapsed_s, p);
     if (!is_outlier_[i] && to != BiasMode::kDirect) next = corrected(next, difference, fix.shadow_variance);
     biases_.mode[i] = lasting(to);
     biases_.x[i] = next.mean.x();
     biases_.y[i] = next.mean.y();
     biases_.variance[i] = next.variance;
   }
+}
+
+bool SwitchingParticleFilter::is_beyond_median(const FixMeasurement& fix, double elapsed_s) const {
+  const double fade = bias_fade(elapsed_s, parameters_.modes);
+  Eigen::Vector2d mean = Eigen::Vector2d::Zero();
+  Eigen::Matrix2d square = Eigen::Matrix2d::Zero();
+  for (std::size_t i = 0; i < particles_.size(); ++i) {
+    Eigen::Vector2d difference = fix.position - transform_point(particles_.pose(i), fix.antenna_in_body);
+    double variance = 0.0;
+    if (biases_.mode[i] != BiasMode::kDirect) {
+      difference -= fade * Eigen::Vector2d(biases_.x[i], biases_.y[i]);
+      variance = fade * fade * biases_.variance[i] + bias_growth(biases_.mode[i], elapsed_s, parameters_.modes);
+    }
+    mean += particles_.weight[i] * difference;
+    square += particles_.weight[i] * (difference * difference.transpose() + variance * Eigen::Matrix2d::Identity());
+  }
+  const Eigen::Matrix2d covariance =
+      square - mean * mean.transpose() + noise_.scale() * parameters_.fix.direct_covariance(fix.covariance);
+  return mean.dot(covariance.ldlt().solve(mean)) > FixNoiseModel::kMedianNis;
 }
 
 void SwitchingParticleFilter::examine(const FixMeasurement& fix, FixVerdict& verdict) const {

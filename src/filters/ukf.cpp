@@ -100,6 +100,10 @@ void Ukf::move(const Twist2& twist, double duration_s) {
                           motion_weights_.centre_covariance * mean * mean.transpose();
   const double scale_walk = parameters_.odometry.speed_scale_walk;
   const double bias_walk = parameters_.odometry.yaw_rate_bias_walk;
+  const double position_walk = parameters_.odometry.position_walk;
+  const double heading_walk = parameters_.odometry.heading_walk;
+  covariance.diagonal().head<2>().array() += position_walk * position_walk * duration_s;
+  covariance(kYaw, kYaw) += heading_walk * heading_walk * duration_s;
   covariance(3, 3) += scale_walk * scale_walk * duration_s;
   covariance(4, 4) += bias_walk * bias_walk * duration_s;
 

@@ -12,7 +12,10 @@ namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
-ImmEkf make(const std::string& changes = "{}") { return ImmEkf(with(ImmEkfParameters{}, changes), {}); }
+ImmEkfParameters textbook(const std::string& changes = "{}") {
+  return with(with(ImmEkfParameters{}, kTextbookNoise), changes);
+}
+ImmEkf make(const std::string& changes = "{}") { return ImmEkf(textbook(changes), {}); }
 
 /// The extended Kalman filter of pose and odometry errors, without anything else.
 class PlainEkf : public Localizer {
@@ -47,7 +50,7 @@ class PlainEkf : public Localizer {
   LocalizerHealth health() const override { return {}; }
 
  private:
-  OdometryErrorParameters parameters_;
+  OdometryErrorParameters parameters_ = textbook().odometry;
   Pose2 pose_;
   OdometryErrors errors_;
   ErrorCovariance covariance_;
@@ -74,7 +77,7 @@ TEST(ImmEkf, NoBiasCostsLittle) {
 
 /// One fix, by Bayes' rule over all that may have happened.
 TEST(ImmEkf, ProbabilitiesOfOneFixAreBayes) {
-  ImmEkfParameters p;
+  ImmEkfParameters p = textbook();
   p.fix.shadow_sigma = 2.0 * p.fix.direct_sigma;
   const double elapsed = 2.0;
   ImmEkf imm(p, {});
@@ -260,15 +263,21 @@ TEST(ImmEkf, OddsOfABiasMatter) {
 
 TEST(ImmEkf, EveryParameterHasAnEffectF36) {
   const std::vector<std::pair<std::string, std::string>> changes = {
-      {"use_fix_covariance: false", "{}"}, {"direct_sigma: 1.0", "{}"},      {"shadow_sigma: 1.0", "{}"},
-      {"direct_time: 20.0", "{}"},         {"slow_bias_time: 5.0", "{}"},    {"fast_bias_time: 3.0", "{}"},
-      {"bias_end_time: 5.0", "{}"},        {"jump_share: 0.5", "{}"},        {"slow_bias_walk: 0.5", "{}"},
-      {"fast_bias_walk: 3.0", "{}"},       {"jump_sigma: 5.0", "{}"},        {"onset_sigma: 1.0", "{}"},
-      {"outlier_share: 0.1", "{}"},        {"outlier_radius: 20.0", "{}"},   {"motion_noise_factor: 1.0", "{}"},
-      {"speed_scale_sigma: 0.01", "{}"},   {"speed_scale_walk: 0.01", "{}"}, {"yaw_rate_bias_sigma: 0.01", "{}"},
-      {"yaw_rate_bias_walk: 0.001", "{}"},
+      {"use_fix_covariance: false", "{}"}, {"direct_sigma: 1.0", "{}"},
+      {"shadow_sigma: 1.0", "{}"},         {"direct_time: 20.0", "{}"},
+      {"slow_bias_time: 5.0", "{}"},       {"fast_bias_time: 3.0", "{}"},
+      {"bias_end_time: 5.0", "{}"},        {"jump_share: 0.5", "{}"},
+      {"slow_bias_walk: 0.5", "{}"},       {"fast_bias_walk: 3.0", "{}"},
+      {"jump_sigma: 5.0", "{}"},           {"onset_sigma: 1.0", "{}"},
+      {"outlier_share: 0.1", "{}"},        {"outlier_radius: 20.0", "{}"},
+      {"motion_noise_factor: 1.0", "{}"},  {"speed_scale_sigma: 0.01", "{}"},
+      {"speed_scale_walk: 0.01", "{}"},    {"yaw_rate_bias_sigma: 0.01", "{}"},
+      {"yaw_rate_bias_walk: 0.001", "{}"}, {"position_walk: 0.2", "{}"},
+      {"heading_walk: 0.05", "{}"},        {"bias_fade_time: 5.0", "{}"},
+      {"student_dof: 2.0", "{}"},          {"fix_scale_rate: 0.1", "{}"},
+      {"fix_correlation_time: 2.0", "{}"}, {"fix_scale_limit: 1.05", "fix_scale_rate: 0.1"},
   };
-  EXPECT_EQ(changes.size() + 1, parameter_names(ImmEkfParameters{}).size());
+  EXPECT_EQ(changes.size() + 2, parameter_names(ImmEkfParameters{}).size());  // and those of a parked robot
   SwitchingDrive d;
   d.bias = bias_between(20.0, 40.0, {4.0, 3.0});
   d.duration_s = 60.0;
@@ -277,7 +286,7 @@ TEST(ImmEkf, EveryParameterHasAnEffectF36) {
     return drive(imm, d).back().estimate.pose;
   };
   for (const auto& [change, base] : changes) {
-    const ImmEkfParameters before = with(ImmEkfParameters{}, base);
+    const ImmEkfParameters before = textbook(base);
     EXPECT_FALSE(last(with(before, change)) == last(before)) << change;
   }
   ImmEkf parked = make("parked_walk: 0.0");
@@ -287,6 +296,16 @@ TEST(ImmEkf, EveryParameterHasAnEffectF36) {
     imm->move({0.0, 0.0}, 10.0);
   }
   EXPECT_LT(parked.health().position_spread_m, drifting.health().position_spread_m);
+  // A parked robot's fixes share their error: the second says less.
+  ImmEkf doubting = make("parked_correlation_time: 30.0");
+  for (ImmEkf* imm : {&doubting, &drifting}) {
+    imm->initialize(pose_with_sigma({}, 1.0, 0.1));
+    for (double time_s : {1.0, 2.0}) {
+      imm->move({0.0, 0.0}, 1.0);
+      imm->correct(fix_of({0.0, 0.0}, 1.0, time_s));
+    }
+  }
+  EXPECT_GT(doubting.health().position_spread_m, 1.05 * drifting.health().position_spread_m);
 }
 
 }  // namespace

@@ -15,13 +15,14 @@ namespace {
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 ParticleFilterParameters switching(const std::string& changes = "{}") {
-  return with(with(ParticleFilterParameters{}, "mode: switching"), changes);
+  return with(with(with(ParticleFilterParameters{}, "mode: switching"), kTextbookNoise), changes);
 }
 SwitchingParticleFilter make(const std::string& changes = "{}") { return {switching(changes), {}}; }
 
 TEST(SwitchingParticleFilter, ArraysAgreeWithThePlainForm) {
   std::map<BiasMode, int> seen;
-  for (const char* changes : {"{}", "{outlier_share: 0.0, jump_share: 0.2, direct_time: 3.0, fast_bias_time: 2.0}",
+  for (const char* changes : {"{}", "{student_dof: 2.0, bias_fade_time: 5.0}",
+                              "{outlier_share: 0.0, jump_share: 0.2, direct_time: 3.0, fast_bias_time: 2.0}",
                               "{outlier_share: 0.4, outlier_radius: 3.0, direct_time: 1.0, jump_share: 0.3}"}) {
     const ParticleFilterParameters p = with(switching(changes), "{particle_count: 400, shadow_sigma: 4.0}");
     const PoseEstimate start = pose_with_sigma({3.0, -1.0, 0.5}, 0.05, 0.02);  // close together: nothing is resampled
@@ -242,6 +243,13 @@ TEST(SwitchingParticleFilter, EveryParameterHasAnEffectF36) {
       {"speed_scale_walk: 0.01", "{}"},
       {"yaw_rate_bias_sigma: 0.01", "{}"},
       {"yaw_rate_bias_walk: 0.001", "{}"},
+      {"position_walk: 0.2", "{}"},
+      {"heading_walk: 0.05", "{}"},
+      {"bias_fade_time: 5.0", "{}"},
+      {"student_dof: 2.0", "{}"},
+      {"fix_scale_rate: 0.1", "{}"},
+      {"fix_scale_limit: 1.05", "fix_scale_rate: 0.1"},
+      {"fix_correlation_time: 2.0", "{}"},
   };
   SwitchingDrive d;
   d.bias = bias_between(10.0, 20.0, {4.0, 3.0});

@@ -46,17 +46,17 @@ constexpr BiasMode lasting(BiasMode mode) { return mode == BiasMode::kJump ? Bia
 
 /// The model of a switching bias. Times are means of exponentially distributed ones.
 struct BiasModeParameters {
-  double direct_time{60.0};      ///< s, tau_S: direct reception until the next bias
+  double direct_time{1000.0};    ///< s, tau_S: direct reception until the next bias
   double slow_bias_time{20.0};   ///< s, tau_L: a slow bias until it changes fast or jumps
   double fast_bias_time{1.0};    ///< s, tau_F: a fast changing bias until it ends, becomes slow or jumps
-  double bias_end_time{60.0};    ///< s, tau_LS: a slow bias until it ends
+  double bias_end_time{5.0};     ///< s, tau_LS: a slow bias until it ends
   double jump_share{0.9};        ///< p_J: of the onsets and changes, those that come at once
-  double slow_bias_walk{0.2};    ///< m/sqrt(s) per axis, sqrt(q_s)
+  double slow_bias_walk{0.3};    ///< m/sqrt(s) per axis, sqrt(q_s)
   double fast_bias_walk{1.0};    ///< m/sqrt(s) per axis, sqrt(q_f)
-  double jump_sigma{20.0};       ///< m per axis, sigma_J, of a bias that came at once
+  double jump_sigma{8.0};        ///< m per axis, sigma_J, of a bias that came at once
+  double bias_fade_time{20.0};   ///< s, after which a bias is again like one that has just come; 0: it never forgets
   double onset_sigma{0.5};       ///< m per axis, of a bias that begins without a jump
-  double student_dof{1.0};       ///< degrees of freedom of the noise in direct reception; large ones are Gaussian
-  double bias_fade_time{0.0}; double fade_sigma{0.0};
+  double student_dof{2.0};       ///< degrees of freedom of the noise in direct reception; large ones are Gaussian
   double outlier_share{0.01};    ///< of the fixes, those that say nothing
   double outlier_radius{200.0};  ///< m, within which such a fix is anywhere
 
@@ -70,8 +70,9 @@ struct BiasModeParameters {
     v("slow_bias_walk", slow_bias_walk, non_negative());
     v("fast_bias_walk", fast_bias_walk, non_negative());
     v("jump_sigma", jump_sigma, positive());
+    v("bias_fade_time", bias_fade_time, non_negative());
     v("onset_sigma", onset_sigma, non_negative());
-    v("student_dof", student_dof, positive()); v("bias_fade_time", bias_fade_time, non_negative()); v("fade_sigma", fade_sigma, non_negative());
+    v("student_dof", student_dof, positive());
     v("outlier_share", outlier_share, between(0.0, 0.5));
     v("outlier_radius", outlier_radius, positive());
   }
@@ -100,6 +101,10 @@ struct BiasState {
   Eigen::Vector2d mean{Eigen::Vector2d::Zero()};
   double variance{0.0};
 };
+
+/// What is left after `elapsed_s` >= 0 of a bias that goes on, as a share of it: a bias is a first-order Markov process
+/// whose stationary standard deviation is jump_sigma.
+double bias_fade(double elapsed_s, const BiasModeParameters& parameters);
 
 /// Variance (m^2 per axis) by which a bias in `to` grows over `elapsed_s` >= 0.
 double bias_growth(BiasMode to, double elapsed_s, const BiasModeParameters& parameters);

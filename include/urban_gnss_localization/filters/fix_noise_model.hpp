@@ -12,8 +12,8 @@ namespace urban_gnss {
 struct FixNoiseModelParameters {
   /// 1, by how much a fix changes the logarithm of the factor on the declared covariance; 0: the factor stays 1
   double fix_scale_rate{0.03};
-  double fix_scale_limit{20.0};           ///< factor by which declared standard deviations may be wrong, either way
-  double fix_correlation_time{2.0};       ///< s, over which the error of a fix stays the same; 0: independent errors
+  double fix_scale_limit{20.0};          ///< factor by which declared standard deviations may be wrong, either way
+  double fix_correlation_time{3.0};      ///< s, over which the error of a fix stays the same; 0: independent errors
   double parked_correlation_time{30.0};  ///< s, the same while the robot stands: reflections change little then (F34)
 
   template <class V>

@@ -4,6 +4,7 @@
 
 #include "urban_gnss_localization/filters/bias_modes.hpp"
 #include "urban_gnss_localization/filters/fix_likelihood.hpp"
+#include "urban_gnss_localization/filters/fix_noise_model.hpp"
 #include "urban_gnss_localization/filters/particle_localizer.hpp"
 #include "urban_gnss_localization/filters/resampling.hpp"
 #include "urban_gnss_localization/filters/sampling.hpp"
@@ -41,6 +42,7 @@ struct ParticleFilterParameters {
   double gate_probability{0.99};  ///< conventional mode: gate on the NIS; 1 switches it off
   double gate_timeout{5.0};       ///< s of nothing but rejections after which it restarts on the fix
   int seed{1};
+  FixNoiseModelParameters noise;     ///< of the mode switching
   BiasModeParameters modes;          ///< of the mode switching
   OdometryErrorParameters odometry;  ///< of the mode switching
 
@@ -60,6 +62,7 @@ struct ParticleFilterParameters {
     v("gate_probability", gate_probability, Range{0.0, 1.0, true});
     v("gate_timeout", gate_timeout, positive());
     v("seed", seed, any_number());
+    noise.visit(v);
     modes.visit(v);
     odometry.visit(v);
   }

@@ -84,6 +84,9 @@ class SwitchingParticleFilter : public ParticleLocalizer {
  private:
   void continue_all(const SwitchingFix& fix);
   void examine(const FixMeasurement& fix, FixVerdict& verdict) const;
+  /// Whether the fix is farther from what all particles together predict, their biases included, than half of the
+  /// fixes are.
+  bool is_beyond_median(const FixMeasurement& fix, double elapsed_s) const;
   void update_estimate();
   void resample();
   ParticleFilterParameters parameters_;
@@ -93,7 +96,8 @@ class SwitchingParticleFilter : public ParticleLocalizer {
   Resampler resampler_;
   BiasSet biases_;
   OdometryErrorSet errors_;
-  OdometryErrors mean_errors_;            ///< at the last fix
+  OdometryErrors mean_errors_;  ///< at the last fix
+  FixNoiseModel noise_;
   std::vector<BiasMode> modes_before_;    ///< scratch of resampling
   std::vector<std::uint8_t> is_outlier_;  ///< whether the particle took the last fix for one
   double bias_odds_{1.0};
