@@ -24,7 +24,8 @@ struct UkfParameters {
   double gate_probability{0.99};     ///< that a good fix is not called an outlier; 1: none is
   double gate_timeout{5.0};          ///< s of nothing but rejections after which it restarts on the fix
   double fix_correlation_time{1.0};  ///< s, over which the error of fixes stays the same; 0: independent errors
-  OdometryErrorParameters odometry;
+  /// All noise of the odometry is in the motion model, as in the paper.
+  OdometryErrorParameters odometry{0.1, 0.03, 2e-4, 0.005, 3e-5, 0.0, 0.0, 0.03};
   double ukf_alpha{0.5};  ///< spread of the sigma points
   double ukf_beta{2.0};   ///< 2 is best for Gaussian errors
   double ukf_kappa{0.0};  ///< secondary spread
