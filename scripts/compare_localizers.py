@@ -42,9 +42,22 @@ METHODS = {
 COLOURS = {"EKF": "#e69f00", "gated EKF": "#843c39", "complementary EKF": "#d55e00", "UKF": "#7b4fd6",
            "paper": "#0072b2", "IMM": "#56b4e9", "switching": "#009e73", RAW_FIX: common.FIX_COLOUR}
 
-# What an information is worth: the recommended method without it.
-ABLATED = "switching"
-ABLATIONS = {}
+# What an information is worth: the method that does best without it.
+ABLATED = "IMM"
+ABLATIONS = {
+    "odometry errors as states": ["speed_scale_sigma=0.0", "speed_scale_walk=0.0", "yaw_rate_bias_sigma=0.0",
+                                  "yaw_rate_bias_walk=0.0"],
+    "formal covariance": ["use_fix_covariance=false", "direct_sigma=10.0", "shadow_sigma=10.0"],
+    "learnt scale": ["fix_scale_rate=0.0"],
+    "formal covariance, learnt scale": ["use_fix_covariance=false", "direct_sigma=10.0", "shadow_sigma=10.0",
+                                        "fix_scale_rate=0.0"],
+    "correlation of errors": ["fix_correlation_time=0.0", "parked_correlation_time=0.0"],
+    "more of it when parked": ["parked_correlation_time=3.0"],
+    "heavy tails": ["student_dof=1.0e+9"],
+    "outliers": ["outlier_share=0.0"],
+    "heavy tails, outliers": ["student_dof=1.0e+9", "outlier_share=0.0"],
+    "biased modes": ["direct_time=1.0e+15"],
+}
 
 DIVERGED_M = 100.0
 DIVERGED_S = 30.0
@@ -265,7 +278,7 @@ def ablate(results):
     rows = []
     for name in [ABLATED] + list(ABLATIONS):
         change = ratios(results, name, ABLATED)
-        rows.append([name if name != ABLATED else "nothing (switching)"]
+        rows.append([name if name != ABLATED else "nothing"]
                     + ["{:+.0f} %".format(100.0 * (ratio - 1.0)) for ratio in change]
                     + [scores[name].cell() for scores in results.values()])
     return header, rows
@@ -277,7 +290,8 @@ def compare(options):
     methods = {name: METHODS[name] for name in options.methods or METHODS}
     if options.ablation:
         methods = {ABLATED: METHODS[ABLATED]}
-        methods.update({name: METHODS[ABLATED] + arguments for name, arguments in ABLATIONS.items()})
+        methods.update({name: METHODS[ABLATED] + [part for text in changes for part in ("--set", text)]
+                        for name, changes in ABLATIONS.items()})
     overrides = [part for text in options.overrides for part in ("--set", text)]
     results, tracks = {}, {}
     with concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:

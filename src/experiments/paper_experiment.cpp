@@ -49,9 +49,9 @@ class Estimator {
       return;
     }
     if (kind_ == PaperMethod::Kind::kImm) {
-      filter_ = std::make_unique<ImmEkf>(
-          ImmEkfParameters{conditions.filter.fix, conditions.filter.modes, conditions.filter.odometry},
-          conditions.filter_motion);
+      filter_ = std::make_unique<ImmEkf>(ImmEkfParameters{conditions.filter.fix, conditions.filter.noise,
+                                                          conditions.filter.modes, conditions.filter.odometry},
+                                         conditions.filter_motion);
     } else {
       auto filter = make_particle_filter(conditions.filter, conditions.filter_motion);
       particle_filter_ = filter.get();

@@ -19,7 +19,8 @@
 #include "parallel_jobs.hpp"
 #include "urban_gnss_localization/evaluation/report_json.hpp"
 #include "urban_gnss_localization/filters/complementary_ekf.hpp"
-#include "urban_gnss_localization/filters/particle_filter.hpp"
+#include "urban_gnss_localization/filters/imm_ekf.hpp"
+#include "urban_gnss_localization/filters/switching_particle_filter.hpp"
 #include "urban_gnss_localization/filters/ukf.hpp"
 #include "urban_gnss_localization/geometry/angles.hpp"
 
@@ -32,7 +33,9 @@ const std::string kWithOcclusion = "+occlusion";
 
 struct Options {
   std::vector<std::string> scenarios{"downtown_grid", "campus_loop", "building_pass", "open_sky", "tunnel"};
-  std::vector<std::string> localizers{"paper", "ekf", "gated_ekf", "complementary_ekf", "ukf", "ukf+occlusion"};
+  std::vector<std::string> localizers{
+      "paper",         "ekf",     "gated_ekf",         "complementary_ekf", "ukf",
+      "ukf+occlusion", "imm_ekf", "imm_ekf+occlusion", "switching",         "switching+occlusion"};
   int seeds = 10;
   int first_seed = 1;
   double duration_s = 0.0;
@@ -50,6 +53,8 @@ struct Settings {
   ComplementaryEkfParameters complementary_ekf;
   UkfParameters ukf;
   MotionParameters ukf_motion;
+  ImmEkfParameters imm_ekf;
+  MotionParameters imm_ekf_motion;
 };
 
 Settings read_settings(const std::vector<std::string>& overrides) {
@@ -78,6 +83,7 @@ Settings read_settings(const std::vector<std::string>& overrides) {
   read("particle_filter", settings.particle_filter, settings.particle_filter_motion);
   read("complementary_ekf", settings.complementary_ekf);
   read("ukf", settings.ukf, settings.ukf_motion);
+  read("imm_ekf", settings.imm_ekf, settings.imm_ekf_motion);
   for (const auto& [section, values] : sections) faults.push_back(section + ": no such section");
   if (!faults.empty()) throw ParameterError("--set", faults);
   return settings;
@@ -89,19 +95,23 @@ std::function<std::unique_ptr<Localizer>()> localizer_of(const std::string& name
     parameters.mode = mode;
     return [parameters] { return std::make_unique<ComplementaryEkf>(parameters); };
   };
-  if (name == "paper") {
-    return [&settings] {
-      return std::make_unique<ParticleFilter>(settings.particle_filter, settings.particle_filter_motion);
-    };
+  if (name == "paper" || name == "switching") {
+    ParticleFilterParameters parameters = settings.particle_filter;
+    parameters.mode = name == "paper" ? ParticleFilterMode::kPaper : ParticleFilterMode::kSwitching;
+    return [parameters, &settings] { return make_particle_filter(parameters, settings.particle_filter_motion); };
+  }
+  if (name == "imm_ekf") {
+    return [&settings] { return std::make_unique<ImmEkf>(settings.imm_ekf, settings.imm_ekf_motion); };
   }
   if (name == "ekf") return complementary(ComplementaryMode::kStandard);
   if (name == "gated_ekf") return complementary(ComplementaryMode::kGated);
   if (name == "complementary_ekf") return complementary(ComplementaryMode::kCompensated);
   if (name == "ukf") return [&settings] { return std::make_unique<Ukf>(settings.ukf, settings.ukf_motion); };
-  throw std::runtime_error("--localizers " + name +
-                           ": no such localizer; there are paper, ekf, gated_ekf, complementary_ekf, ukf, each also "
-                           "with " +
-                           kWithOcclusion);
+  throw std::runtime_error(
+      "--localizers " + name +
+      ": no such localizer; there are paper, switching, ekf, gated_ekf, complementary_ekf, ukf, imm_ekf, each also "
+      "with " +
+      kWithOcclusion);
 }
 
 std::vector<Contender> select_contenders(const std::vector<std::string>& names, const Settings& settings) {
