@@ -150,7 +150,7 @@ def run_recording(data, output, recording, methods, overrides):
     for method, arguments in methods.items():
         runs.append(os.path.join(folder, file_name(method) + ".bag"))
         call(*program("replay"), bag, "--output", runs[-1], *arguments, *overrides)
-    call(*program("evaluate"), *runs, "--truth", bag, "--output", folder, "--no-plots")
+    call(*program("evaluate"), *runs, bag, "--truth", bag, "--output", folder, "--no-plots")
     for run in runs:
         os.remove(run)
     return read_scores(folder, methods)
@@ -165,18 +165,10 @@ def read_scores(folder, methods):
                                  ("t", "position_error_m", "est_x", "est_y", "truth_x", "truth_y"))
         scores[method] = Scores(errors["t"], errors["position_error_m"])
         tracks[method] = errors
-    fixes = common.read_optional_csv(
-        os.path.join(folder, "data", "errors_" + file_name(next(iter(methods))) + "_gps_fix.csv"),
-        ("t", "position_error_m", "est_x", "est_y"))
-    if fixes is None:
-        path = os.path.join(folder, "data",
-                            "fixes_" + file_name(next(iter(methods))) + "_" + ESTIMATE.replace("/", "_") + ".csv")
-        fixes = common.read_csv(path, ("t", "fix_x", "fix_y", "error_m"))
-        scores[RAW_FIX] = Scores(fixes["t"], fixes["error_m"])
-        tracks[RAW_FIX] = (fixes["fix_x"], fixes["fix_y"])
-    else:
-        scores[RAW_FIX] = Scores(fixes["t"], fixes["position_error_m"])
-        tracks[RAW_FIX] = (fixes["est_x"], fixes["est_y"])
+    fixes = common.read_csv(os.path.join(folder, "data", "errors_recording_gps_fix.csv"),
+                            ("t", "position_error_m", "est_x", "est_y"))
+    scores[RAW_FIX] = Scores(fixes["t"], fixes["position_error_m"])
+    tracks[RAW_FIX] = (fixes["est_x"], fixes["est_y"])
     return scores, tracks
 
 

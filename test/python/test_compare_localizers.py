@@ -24,12 +24,13 @@ output = sys.argv[sys.argv.index("--output") + 1]
 os.makedirs(os.path.join(output, "data"), exist_ok=True)
 for run in runs:
     stem = os.path.splitext(os.path.basename(run))[0]
-    with open(os.path.join(output, "data", "errors_" + stem + "_odometry_filtered.csv"), "w") as file:
+    is_recording = stem == "recording"
+    name = stem + ("_gps_fix" if is_recording else "_odometry_filtered")
+    size = 7 if is_recording else len(stem)
+    with open(os.path.join(output, "data", "errors_" + name + ".csv"), "w") as file:
         file.write("t,position_error_m,heading_error_rad,est_x,est_y,truth_x,truth_y,sigma_m,nees\\n")
         for t in range(40):
-            file.write("%d,%d,0,%d,0,%d,0,1,1\\n" % (t, len(stem), t + len(stem), t))
-    with open(os.path.join(output, "data", "fixes_" + stem + "_odometry_filtered.csv"), "w") as file:
-        file.write("t,fix_x,fix_y,error_m\\n0,0,0,7\\n1,1,0,7\\n")
+            file.write("%d,%d,0,%d,0,%d,0,1,1\\n" % (t, size, t + size, t))
 """
 REPLAY = """#!/usr/bin/env python3
 import sys
