@@ -1,12 +1,12 @@
-// The cost of one step of the paper's filter and of its parts. Read the paper mode's step against the interval of the
-// odometry (10 ms in the paper's field).
+// The cost of one step of the particle filters and of their parts. Read the paper mode's step against the interval of
+// the odometry (10 ms in the paper's field).
 //
 //   particle_filter_benchmark --benchmark_min_time=0.5
 
 #include <benchmark/benchmark.h>
 
 #include "urban_gnss_localization/filters/bias_kalman_filter.hpp"
-#include "urban_gnss_localization/filters/particle_filter.hpp"
+#include "urban_gnss_localization/filters/switching_particle_filter.hpp"
 
 namespace urban_gnss {
 namespace {
@@ -38,29 +38,33 @@ ParticleSet cloud(std::size_t count) {
 
 void count_particles(benchmark::State& state) { state.SetItemsProcessed(state.iterations() * state.range(0)); }
 
-void BM_PaperStep(benchmark::State& state) {
+void BM_Step(benchmark::State& state, ParticleFilterMode mode) {
   ParticleFilterParameters parameters;
+  parameters.mode = mode;
   parameters.particle_count = static_cast<int>(state.range(0));
-  parameters.direct_sigma = 0.05;
-  parameters.shadow_sigma = 0.316;
-  parameters.use_fix_covariance = false;
+  parameters.fix.direct_sigma = 0.05;
+  parameters.fix.shadow_sigma = 0.316;
+  parameters.fix.use_fix_covariance = false;
   parameters.cluster_cell = 0.5;
-  ParticleFilter filter(parameters, paper_motion());
-  filter.initialize({});
+  const auto filter = make_particle_filter(parameters, paper_motion());
+  filter->initialize({});
   Pose2 truth;
   FixMeasurement fix;
   fix.covariance = 0.0025 * Eigen::Matrix2d::Identity();
   fix.bias_radius_m = 2.0;
   for (auto _ : state) {
     truth = move(truth, kTwist, kStep_s);
-    filter.move(kTwist, kStep_s);
+    filter->move(kTwist, kStep_s);
     fix.position = truth.position() + Eigen::Vector2d(2.0, 0.0);
     fix.time_s += kStep_s;
-    benchmark::DoNotOptimize(filter.correct(fix));
+    benchmark::DoNotOptimize(filter->correct(fix));
   }
   count_particles(state);
 }
+void BM_PaperStep(benchmark::State& state) { BM_Step(state, ParticleFilterMode::kPaper); }
 BENCHMARK(BM_PaperStep)->Arg(1000)->Arg(10000)->Unit(benchmark::kMicrosecond);
+void BM_SwitchingStep(benchmark::State& state) { BM_Step(state, ParticleFilterMode::kSwitching); }
+BENCHMARK(BM_SwitchingStep)->Arg(1000)->Arg(10000)->Unit(benchmark::kMicrosecond);
 
 void BM_SampleMotion(benchmark::State& state) {
   ParticleSet particles = cloud(static_cast<std::size_t>(state.range(0)));

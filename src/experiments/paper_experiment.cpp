@@ -3,7 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <utility>
 
+#include "urban_gnss_localization/filters/imm_ekf.hpp"
+#include "urban_gnss_localization/filters/switching_particle_filter.hpp"
 #include "urban_gnss_localization/pipeline/bias_pipeline.hpp"
 
 namespace urban_gnss {
@@ -43,10 +46,18 @@ class Estimator {
       ParticleSet single(1);
       single.draw_gaussian(start, engine);
       dead_reckoned_ = single.pose(0);
-    } else {
-      filter_ = std::make_unique<ParticleFilter>(conditions.filter, conditions.filter_motion);
-      filter_->initialize(start);
+      return;
     }
+    if (kind_ == PaperMethod::Kind::kImm) {
+      filter_ = std::make_unique<ImmEkf>(ImmEkfParameters{conditions.filter.fix, conditions.filter.noise,
+                                                          conditions.filter.modes, conditions.filter.odometry},
+                                         conditions.filter_motion);
+    } else {
+      auto filter = make_particle_filter(conditions.filter, conditions.filter_motion);
+      particle_filter_ = filter.get();
+      filter_ = std::move(filter);
+    }
+    filter_->initialize(start);
   }
 
   void move(const Twist2& twist, double duration_s) {
@@ -77,14 +88,15 @@ class Estimator {
 
   Pose2 pose() const { return filter_ ? filter_->pose() : dead_reckoned_; }
   double radius() const { return radius_; }
-  double effective_sample_size() const { return filter_ ? filter_->effective_sample_size() : 0.0; }
-  const ParticleSet* particles() const { return filter_ ? &filter_->particles() : nullptr; }
+  double effective_sample_size() const { return particle_filter_ ? particle_filter_->effective_sample_size() : 0.0; }
+  const ParticleSet* particles() const { return particle_filter_ ? &particle_filter_->particles() : nullptr; }
 
  private:
   PaperMethod::Kind kind_;
   PaperFieldParameters field_;
   BiasTracker bias_;
-  std::unique_ptr<ParticleFilter> filter_;
+  std::unique_ptr<Localizer> filter_;
+  const ParticleLocalizer* particle_filter_{nullptr};  ///< filter_, where it is one
   Pose2 dead_reckoned_;
   double radius_{0.0};
 };
@@ -92,7 +104,7 @@ class Estimator {
 void make_oracle(PaperExperimentConditions& c) {
   c.filter.mode = ParticleFilterMode::kConventional;
   c.filter.likelihood = LikelihoodChoice::kProduct;
-  c.filter.use_fix_covariance = true;
+  c.filter.fix.use_fix_covariance = true;
 }
 
 }  // namespace
@@ -147,6 +159,9 @@ const std::vector<PaperMethod>& paper_methods() {
          c.filter.mode = ParticleFilterMode::kConventional;
          c.filter.likelihood = LikelihoodChoice::kProduct;
        }},
+      {"switching", Kind::kFilter, "switching bias, Rao-Blackwellized particle filter",
+       [](auto& c) { c.filter.mode = ParticleFilterMode::kSwitching; }},
+      {"imm", Kind::kImm, "switching bias, interacting multiple models", [](auto&) {}},
       {"dead_reckoning", Kind::kDeadReckoning, "the inputs alone", [](auto&) {}},
       {"oracle_zone", Kind::kOracleZone, "knows the shadow and drops the fix there", make_oracle},
       {"oracle", Kind::kOracle, "knows the shadow and the bias", make_oracle},

@@ -149,7 +149,7 @@ void ParticleClusters::find(const ParticleSet& particles) {
 Pose2 ParticleClusters::heaviest_mean(const ParticleSet& particles) const {
   PoseSums sums;
   for (std::size_t i = 0; i < particles.size(); ++i) {
-    if (cell_of_particle_[i] == heaviest_ && heaviest_ != kNone) sums.add(particles, i);
+    if (is_in_heaviest(i)) sums.add(particles, i);
   }
   return sums.weight > 0.0 ? sums.mean() : circular_mean(particles);
 }

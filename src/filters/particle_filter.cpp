@@ -15,7 +15,8 @@ constexpr int kFixDof = 2;
 EnumNames<ParticleFilterMode> enum_names(ParticleFilterMode) {
   return {{"literal", ParticleFilterMode::kLiteral},
           {"paper", ParticleFilterMode::kPaper},
-          {"conventional", ParticleFilterMode::kConventional}};
+          {"conventional", ParticleFilterMode::kConventional},
+          {"switching", ParticleFilterMode::kSwitching}};
 }
 
 EnumNames<LikelihoodChoice> enum_names(LikelihoodChoice) {
@@ -56,13 +57,12 @@ bool ParticleFilterParameters::uses_gps_heading() const {
 }
 
 ParticleFilter::ParticleFilter(const ParticleFilterParameters& parameters, const MotionParameters& motion)
-    : parameters_(parameters),
+    : ParticleLocalizer(static_cast<std::size_t>(parameters.particle_count), parameters.cluster_cell),
+      parameters_(parameters),
       motion_(motion),
       nis_threshold_(chi_squared_quantile(std::min(parameters.gate_probability, 1.0 - 1e-12), kFixDof)),
-      particles_(static_cast<std::size_t>(parameters.particle_count)),
       ring_(particles_.size(), parameters.mode == ParticleFilterMode::kConventional ? 0.0 : parameters.ring_share),
-      resampler_(particles_.size(), parameters.resampling),
-      clusters_(particles_.size(), parameters.cluster_cell) {
+      resampler_(particles_.size(), parameters.resampling) {
   initialize({});
 }
 
@@ -92,7 +92,8 @@ FixVerdict ParticleFilter::correct(const FixMeasurement& fix) {
   had_fix_ = true;
 
   // Sample: the motion has been drawn by move(); what is left of (22) is the ring.
-  ring_.sample(particles_, estimate_, fix.bias_radius_m, parameters_.direct_sigma, parameters_.shadow_sigma, engine_);
+  ring_.sample(particles_, estimate_, fix.bias_radius_m, parameters_.fix.direct_sigma, parameters_.fix.shadow_sigma,
+               engine_);
 
   // Weigh.
   weigh(particles_, likelihood_of(fix));
@@ -154,11 +155,8 @@ FixLikelihood ParticleFilter::likelihood_of(const FixMeasurement& fix) const {
   likelihood.with_heading = parameters_.uses_gps_heading();
   likelihood.fix = fix.position;
   likelihood.antenna_in_body = fix.antenna_in_body;
-  likelihood.direct_covariance =
-      parameters_.use_fix_covariance
-          ? fix.covariance
-          : Eigen::Matrix2d(parameters_.direct_sigma * parameters_.direct_sigma * Eigen::Matrix2d::Identity());
-  likelihood.shadow_sigma = parameters_.shadow_sigma;
+  likelihood.direct_covariance = parameters_.fix.direct_covariance(fix.covariance);
+  likelihood.shadow_sigma = parameters_.fix.shadow_sigma;
   likelihood.heading_sigma = parameters_.gps_heading_sigma;
   likelihood.radius = fix.bias_radius_m;
   likelihood.fix_heading = fix_heading(fix.position, last_fix_position_, turn_since_fix_);
@@ -169,20 +167,6 @@ Pose2 ParticleFilter::posterior_mean() {
   clusters_.find(particles_);
   if (parameters_.estimate == EstimateMethod::kHeaviestCluster) return clusters_.heaviest_mean(particles_);
   return parameters_.mode == ParticleFilterMode::kLiteral ? arithmetic_mean(particles_) : circular_mean(particles_);
-}
-
-PoseEstimate ParticleFilter::estimate() const { return {estimate_, covariance_about(particles_, estimate_)}; }
-
-LocalizerHealth ParticleFilter::health() const {
-  LocalizerHealth health;
-  health.heading_sigma_rad = circular_sigma(particles_);
-  health.particle_count = static_cast<std::uint32_t>(particles_.size());
-  health.effective_sample_size = effective_sample_size_;
-  health.position_spread_m =
-      std::sqrt(covariance_about(particles_, circular_mean(particles_)).topLeftCorner<2, 2>().trace());
-  health.cluster_mass = clusters_.heaviest_mass();
-  health.cluster_count = clusters_.count();
-  return health;
 }
 
 }  // namespace urban_gnss

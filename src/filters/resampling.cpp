@@ -17,11 +17,13 @@ void Resampler::resample(ParticleSet& particles, RandomEngine& engine) {
   } else {
     draw_systematic(particles.weight, engine);
   }
-  for (std::vector<double>* values : {&particles.x, &particles.y, &particles.yaw}) {
-    for (std::size_t i = 0; i < parents_.size(); ++i) scratch_[i] = (*values)[parents_[i]];
-    values->swap(scratch_);
-  }
+  for (std::vector<double>* values : {&particles.x, &particles.y, &particles.yaw}) gather(*values);
   particles.set_equal_weights();
+}
+
+void Resampler::gather(std::vector<double>& values) {
+  for (std::size_t i = 0; i < parents_.size(); ++i) scratch_[i] = values[parents_[i]];
+  values.swap(scratch_);
 }
 
 void Resampler::draw_multinomial(const std::vector<double>& weight, RandomEngine& engine) {

@@ -6,6 +6,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include "urban_gnss_localization/filters/dead_reckoning.hpp"
 #include "urban_gnss_localization/gnss/chi_squared.hpp"
 
 namespace urban_gnss {
@@ -16,32 +17,12 @@ constexpr int kNoise = 3;  ///< speed, second input, yaw rate: MotionNoise
 constexpr int kAugmented = Ukf::kDimension + kNoise;
 constexpr int kYaw = 2;
 
-/// Both below these, the robot stands: what is left of the yaw rate is a gyroscope's error.
-constexpr double kStandstill_mps = 1e-3;
-constexpr double kStandstill_radps = 0.01;
-
 constexpr double kUnknownYawVariance = kPi * kPi / 3.0;
 constexpr double kMaxInflation = 1e6;
 
-bool is_standstill(const Twist2& twist) {
-  return std::abs(twist.speed_mps) < kStandstill_mps && std::abs(twist.yaw_rate_radps) < kStandstill_radps;
-}
-
-MotionStep scaled(MotionStep step, double factor) {
-  step.speed_sigma *= factor;
-  step.input_sigma *= factor;
-  step.yaw_rate_sigma *= factor;
-  return step;
-}
-
 /// g of eq. (1): the pose after one step of odometry, freed of the errors that the state holds.
-Pose2 moved(const Ukf::State& state, MotionStep step, const MotionNoise& noise) {
-  step.twist.speed_mps *= 1.0 + state[3];
-  step.twist.yaw_rate_radps += state[4];
-  if (step.model == MotionModel::kBicycle) {
-    step.steering_rad = bicycle_input(step.twist, step.wheelbase_m).steering_rad;
-  }
-  return move_noisily({state[0], state[1], state[kYaw]}, step, noise);
+Pose2 moved(const Ukf::State& state, const MotionStep& step, const MotionNoise& noise) {
+  return move_noisily({state[0], state[1], state[kYaw]}, step, noise, {state[3], state[4]});
 }
 
 void limit_yaw_variance(Ukf::Covariance& covariance) {
@@ -72,11 +53,7 @@ Ukf::Ukf(const UkfParameters& parameters, const MotionParameters& motion)
 void Ukf::initialize(const PoseEstimate& start) {
   if (!is_finite(start.pose)) throw std::invalid_argument("ukf: the pose to start from is not finite");
   if (!start.covariance.allFinite()) throw std::invalid_argument("ukf: the covariance to start from is not finite");
-  const double s = parameters_.speed_scale_sigma;
-  const double b = parameters_.yaw_rate_bias_sigma;
-  Covariance covariance = Covariance::Zero();
-  covariance.topLeftCorner<3, 3>() = start.covariance;
-  covariance.diagonal().tail<2>() << s * s, b * b;
+  const Covariance covariance = initial_error_covariance(start.covariance, parameters_.odometry);
   state_ << start.pose.x, start.pose.y, wrap_angle(start.pose.yaw), 0.0, 0.0;
   covariance_ = is_positive_definite(covariance) ? covariance : nearest_positive_definite(covariance);
   limit_yaw_variance(covariance_);
@@ -85,18 +62,15 @@ void Ukf::initialize(const PoseEstimate& start) {
 }
 
 void Ukf::move(const Twist2& twist, double duration_s) {
-  if (!std::isfinite(twist.speed_mps) || !std::isfinite(twist.yaw_rate_radps) || !std::isfinite(duration_s) ||
-      duration_s <= 0.0) {
-    return;
-  }
-  if (is_standstill(twist)) {
+  if (!is_usable(twist, duration_s)) return;
+  if (is_parked(twist)) {
     Covariance covariance = covariance_;
-    covariance.diagonal().head<2>().array() += parameters_.parked_walk * parameters_.parked_walk * duration_s;
+    const double walk = parameters_.odometry.parked_walk;
+    covariance.diagonal().head<2>().array() += walk * walk * duration_s;
     accept(state_, covariance);
     return;
   }
-  const MotionStep step =
-      scaled(make_motion_step(twist, duration_s, motion_), std::sqrt(parameters_.motion_noise_factor));
+  const MotionStep step = make_motion_step(twist, duration_s, motion_, parameters_.odometry);
   const Pose2 centre = moved(state_, step, {});
   const double centre_turn = angle_difference(centre.yaw, state_[kYaw]);
   const Covariance root = motion_weights_.spread * cholesky_root(covariance_);
@@ -124,8 +98,14 @@ void Ukf::move(const Twist2& twist, double duration_s) {
   const auto centred = differences.colwise() - mean;
   Covariance covariance = motion_weights_.other * centred * centred.transpose() +
                           motion_weights_.centre_covariance * mean * mean.transpose();
-  covariance(3, 3) += parameters_.speed_scale_walk * parameters_.speed_scale_walk * duration_s;
-  covariance(4, 4) += parameters_.yaw_rate_bias_walk * parameters_.yaw_rate_bias_walk * duration_s;
+  const double scale_walk = parameters_.odometry.speed_scale_walk;
+  const double bias_walk = parameters_.odometry.yaw_rate_bias_walk;
+  const double position_walk = parameters_.odometry.position_walk;
+  const double heading_walk = parameters_.odometry.heading_walk;
+  covariance.diagonal().head<2>().array() += position_walk * position_walk * duration_s;
+  covariance(kYaw, kYaw) += heading_walk * heading_walk * duration_s;
+  covariance(3, 3) += scale_walk * scale_walk * duration_s;
+  covariance(4, 4) += bias_walk * bias_walk * duration_s;
 
   State state = state_;
   state.head<3>() << centre.x, centre.y, centre.yaw;
@@ -166,8 +146,7 @@ Ukf::Prediction Ukf::predict(const Eigen::Vector2d& antenna_in_body) const {
 
 FixVerdict Ukf::correct(const FixMeasurement& fix) {
   FixVerdict verdict;
-  if (!fix.position.allFinite() || !fix.antenna_in_body.allFinite() || !std::isfinite(fix.time_s) ||
-      !is_positive_definite<2>(fix.covariance)) {
+  if (!is_usable(fix)) {
     verdict.decision = FixDecision::kRejectedNonFinite;
     verdict.reason = "position, time or covariance cannot be used";
     return verdict;

@@ -53,7 +53,7 @@ MotionStep make_motion_step(const Twist2& twist, double duration_s, const Motion
   return step;
 }
 
-Pose2 move_noisily(const Pose2& pose, const MotionStep& step, const MotionNoise& noise) {
+Pose2 move_noisily(const Pose2& pose, const MotionStep& step, const MotionNoise& noise, const OdometryErrors& errors) {
   Twist2 twist = step.twist;
   twist.speed_mps += step.speed_sigma * noise.speed;
   if (step.model == MotionModel::kBicycle) {
@@ -62,6 +62,8 @@ Pose2 move_noisily(const Pose2& pose, const MotionStep& step, const MotionNoise&
   } else {
     twist.yaw_rate_radps += step.input_sigma * noise.input;
   }
+  twist.speed_mps += errors.speed_scale * step.twist.speed_mps;
+  twist.yaw_rate_radps += errors.yaw_rate_bias_radps;
   Pose2 moved = move(pose, twist, step.duration_s);
   moved.yaw = wrap_angle(moved.yaw + step.yaw_rate_sigma * noise.yaw_rate * step.duration_s);
   return moved;

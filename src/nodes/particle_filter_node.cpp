@@ -1,7 +1,7 @@
-// The particle filter of Nishida et al. as a node. Parameters: LocalizerNodeParameters, ParticleFilterParameters,
+// The particle filters as a node. Parameters: LocalizerNodeParameters, ParticleFilterParameters,
 // MotionParameters, and the two below; config/particle_filter.yaml documents each.
 
-#include "urban_gnss_localization/filters/particle_filter.hpp"
+#include "urban_gnss_localization/filters/switching_particle_filter.hpp"
 #include "urban_gnss_localization/ros/localizer_node.hpp"
 #include "urban_gnss_localization/ros/node_parameters.hpp"
 #include "urban_gnss_localization/ros/topics.hpp"
@@ -28,7 +28,7 @@ class ParticleFilterNode {
     read_private_parameters(private_node, shell_parameters_, filter, motion, cloud_parameters_);
     poses_publisher_ = node.advertise<geometry_msgs::PoseArray>(topics::kParticles, 2);
     cloud_publisher_ = node.advertise<sensor_msgs::PointCloud2>(topics::kWeightedParticles, 2);
-    auto localizer = std::make_unique<ParticleFilter>(filter, motion);
+    auto localizer = make_particle_filter(filter, motion);
     filter_ = localizer.get();
     shell_ = std::make_unique<LocalizerNode>(node, private_node, shell_parameters_, std::move(localizer),
                                              [this](const LocalizationOutput& output) { publish_particles(output); });
@@ -56,7 +56,7 @@ class ParticleFilterNode {
   CloudParameters cloud_parameters_;
   ros::Publisher poses_publisher_;
   ros::Publisher cloud_publisher_;
-  const ParticleFilter* filter_{nullptr};  ///< owned by the shell's pipeline
+  const ParticleLocalizer* filter_{nullptr};  ///< owned by the shell's pipeline
   Stamp last_published_{0};
   std::unique_ptr<LocalizerNode> shell_;
 };

@@ -58,6 +58,7 @@ void LocalizationPipeline::reset(const std::string& why) {
   last_radius_m_ = 0.0;
   initialized_ = false;
   lost_ = false;
+  heading_unknown_ = false;
   far_since_.reset();
   last_used_.reset();
   last_verdict_ = {};

@@ -68,7 +68,8 @@ bool LocalizationPipeline::try_start(const PendingFix& pending) {
   if (last_start_fix_ != pending.fix.stamp) return false;  // nothing new since the last try
   std::optional<PoseEstimate> found = heading_initializer_.estimate();
   std::string how = "fixes and motion";
-  if (!found && !initialized_ && heading_initializer_.timed_out()) {
+  const bool is_without_heading = !found && !initialized_ && heading_initializer_.timed_out();
+  if (is_without_heading) {
     found = heading_initializer_.without_heading();
     how = "fixes, heading unknown";
   }
@@ -80,11 +81,20 @@ bool LocalizationPipeline::try_start(const PendingFix& pending) {
   found->pose = compose(compose(found->pose, inverse(Pose2{offset.x(), offset.y(), 0.0})), since);
   last_used_ = pending.fix.stamp;
   start(*found, how);
+  heading_unknown_ = is_without_heading;
+  return true;
+}
+
+bool LocalizationPipeline::start_with_heading(const PendingFix& pending) {
+  if (!heading_unknown_) return false;
+  if (!try_start(pending)) return false;
+  decide_unexamined(pending, "used for a start with heading");
   return true;
 }
 
 bool LocalizationPipeline::restart_if_lost(const PendingFix& pending) {
   remember_for_start(pending);
+  if (start_with_heading(pending)) return true;
   const Eigen::Vector2d predicted = *predicted_antenna(pending.fix.stamp);
   const double sigma = std::sqrt(pending.fix.covariance.trace());  // of the distance, as the receiver declares it
   if ((pending.fix.position - predicted).norm() <= parameters_.max_bias_radius + kFarSigmas * sigma) {
@@ -108,6 +118,7 @@ void LocalizationPipeline::start(const PoseEstimate& pose, const std::string& ho
   localizer_->initialize(pose);
   initialized_ = true;
   lost_ = false;
+  heading_unknown_ = false;
   far_since_.reset();
   start_.reset();
   last_radius_m_ = 0.0;

@@ -19,7 +19,8 @@
 #include "urban_gnss_localization/evaluation/report_json.hpp"
 #include "urban_gnss_localization/evaluation/tum.hpp"
 #include "urban_gnss_localization/filters/complementary_ekf.hpp"
-#include "urban_gnss_localization/filters/particle_filter.hpp"
+#include "urban_gnss_localization/filters/imm_ekf.hpp"
+#include "urban_gnss_localization/filters/switching_particle_filter.hpp"
 #include "urban_gnss_localization/filters/ukf.hpp"
 #include "urban_gnss_localization/ros/conversions.hpp"
 #include "urban_gnss_localization/ros/localizer_node.hpp"
@@ -50,6 +51,7 @@ struct Options {
 struct Parameters {
   LocalizerNodeParameters node;
   ParticleFilterParameters filter;
+  ImmEkfParameters imm;
   UkfParameters ukf;
   MotionParameters motion;
   GpsBiasParameters bias;
@@ -72,7 +74,7 @@ YAML::Node merge_parameters(const Options& options) {
     }
     if (!map.IsMap() && !map.IsNull())
       throw std::runtime_error("--params " + file + ": must be a map of names to values");
-    for (const std::string section : {"gps_bias", "particle_filter", "complementary_ekf", "ukf"}) {
+    for (const std::string section : {"gps_bias", "particle_filter", "complementary_ekf", "imm_ekf", "ukf"}) {
       if (!map.IsMap() || !map[section].IsDefined()) continue;
       // Sections of other localizers may use the same names for other things.
       if (section == options.localizer || (section == "gps_bias" && options.localizer == "particle_filter")) {
@@ -101,13 +103,14 @@ Parameters read_parameters(const Options& options) {
   reader.read(parameters.node);
   if (options.localizer == "complementary_ekf") {
     reader.read(parameters.complementary);
-    reader.ignore("seed");  // nothing in it is random
+  } else if (options.localizer == "imm_ekf") {
+    reader.read(parameters.imm).read(parameters.motion);
   } else if (options.localizer == "ukf") {
     reader.read(parameters.ukf).read(parameters.motion);
-    reader.ignore("seed");
   } else {
     reader.read(parameters.filter).read(parameters.motion).read(parameters.bias);
   }
+  if (options.localizer != "particle_filter") reader.ignore("seed");  // nothing in the others is random
   const auto faults = reader.finish();
   if (!faults.empty()) throw ParameterError("replay", faults);
   return parameters;
@@ -209,7 +212,8 @@ class Replay {
 
  private:
   std::unique_ptr<Localizer> make_localizer(const std::string& name, const Parameters& parameters) {
-    if (name == "particle_filter") return std::make_unique<ParticleFilter>(parameters.filter, parameters.motion);
+    if (name == "particle_filter") return make_particle_filter(parameters.filter, parameters.motion);
+    if (name == "imm_ekf") return std::make_unique<ImmEkf>(parameters.imm, parameters.motion);
     if (name == "ukf") return std::make_unique<Ukf>(parameters.ukf, parameters.motion);
     if (name == "complementary_ekf") {
       auto filter = std::make_unique<ComplementaryEkf>(parameters.complementary);
@@ -217,7 +221,7 @@ class Replay {
       return filter;
     }
     throw std::runtime_error("--localizer " + name +
-                             ": no such localizer; there are particle_filter, complementary_ekf, ukf");
+                             ": no such localizer; there are particle_filter, imm_ekf, complementary_ekf, ukf");
   }
 
   /// Answers the pipeline's questions for the bias, as gps_bias_node does live, and writes what came of it.
@@ -370,7 +374,7 @@ int main(int argc, char** argv) {
   CLI::App app("Runs a bag through a localizer offline; the same input, parameters and seed give the same output.");
   app.option_defaults()->always_capture_default();
   app.add_option("bag", options.input, "the bag to read")->required();
-  app.add_option("--localizer", options.localizer, "particle_filter, complementary_ekf or ukf");
+  app.add_option("--localizer", options.localizer, "particle_filter, imm_ekf, complementary_ekf or ukf");
   app.add_option("--params", options.params, "YAML with the nodes' parameters; repeatable, later files win");
   app.add_option("--set", options.overrides, "one parameter, NAME=VALUE; repeatable");
   app.add_option("--output", options.output, "bag to write: odometry/filtered, gps/bias, status, tf");

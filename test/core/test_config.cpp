@@ -13,6 +13,7 @@
 #include "matchers.hpp"
 #include "urban_gnss_localization/control/waypoint_controller.hpp"
 #include "urban_gnss_localization/filters/complementary_ekf.hpp"
+#include "urban_gnss_localization/filters/imm_ekf.hpp"
 #include "urban_gnss_localization/filters/particle_filter.hpp"
 #include "urban_gnss_localization/filters/ukf.hpp"
 #include "urban_gnss_localization/pipeline/bias_pipeline.hpp"
@@ -155,6 +156,14 @@ TEST(Config, UkfStatesEveryDefault) {
   expect_states(values_of(load("ukf.yaml")), merged(defaults_of(UkfParameters()), defaults_of(MotionParameters())));
 }
 
+TEST(Config, ImmEkfStatesEveryDefault) {
+  const Values file = values_of(load("imm_ekf.yaml"));
+  expect_states(file, merged(defaults_of(ImmEkfParameters()), defaults_of(MotionParameters())));
+  EXPECT_EQ(joined(faults_in(merged(values_of(load("localization.yaml")), file), shell(), LocalizationParameters(),
+                             ImmEkfParameters(), MotionParameters())),
+            kNoFault);
+}
+
 TEST(Config, ComplementaryEkfStatesEveryDefault) {
   const Values file = values_of(load("complementary_ekf.yaml"));
   expect_states(file, defaults_of(ComplementaryEkfParameters()));
@@ -259,8 +268,8 @@ TEST(Config, RosparamReadsTheSameValues) {
   const std::regex text_for_rosparam("[-+]?[0-9]+[eE].*|[-+]?[0-9.]+[eE][0-9].*");
   const std::regex boolean_for_rosparam("on|off|yes|no|y|n", std::regex::icase);
   for (const char* name :
-       {"localization.yaml", "particle_filter.yaml", "complementary_ekf.yaml", "ukf.yaml", "gps_bias.yaml",
-        "occlusion.yaml", "waypoint_controller.yaml", "paper_field/localization.yaml",
+       {"localization.yaml", "particle_filter.yaml", "complementary_ekf.yaml", "imm_ekf.yaml", "ukf.yaml",
+        "gps_bias.yaml", "occlusion.yaml", "waypoint_controller.yaml", "paper_field/localization.yaml",
         "paper_field/particle_filter.yaml", "paper_field/gps_bias.yaml", "paper_field/waypoint_controller.yaml",
         "paper_field/simulator.yaml"}) {
     for (const auto& [key, value] : values_of(load(name))) {
@@ -277,8 +286,8 @@ TEST(Config, RosparamReadsTheSameValues) {
 TEST(Config, EveryDefaultIsExplained) {
   const std::regex parameter("(\\w+):.*");
   const std::regex explained("\\w+: .*# \\S.*");
-  for (const char* name : {"localization.yaml", "particle_filter.yaml", "complementary_ekf.yaml", "ukf.yaml",
-                           "gps_bias.yaml", "occlusion.yaml", "waypoint_controller.yaml"}) {
+  for (const char* name : {"localization.yaml", "particle_filter.yaml", "complementary_ekf.yaml", "imm_ekf.yaml",
+                           "ukf.yaml", "gps_bias.yaml", "occlusion.yaml", "waypoint_controller.yaml"}) {
     std::istringstream lines(read_text(std::string("config/") + name));
     for (std::string line; std::getline(lines, line);) {
       if (!std::regex_match(line, parameter)) continue;

@@ -79,6 +79,54 @@ TEST(DeadReckoning, NoiseDoesNotDependOnTheLengthOfSteps) {
   for (int i = 0; i < kErrorStates; ++i) EXPECT_NEAR(fine(i, i) / coarse(i, i), 1.0, 0.01) << i;
 }
 
+// The motion model's step, against the very motion of the particles: its Jacobian by differences, its noise by draws.
+TEST(DeadReckoning, LinearisesTheMotionModel) {
+  for (const MotionModel model : {MotionModel::kBicycle, MotionModel::kVelocity}) {
+    MotionParameters motion;
+    motion.motion_model = model;
+    motion.wheelbase = 1.3;
+    OdometryErrorParameters parameters;
+    parameters.motion_noise_factor = 0.5;
+    const MotionStep moved = make_motion_step({2.0, 0.4}, 0.1, motion, parameters);
+    const Pose2 start{3.0, -2.0, 2.9};
+    const OdometryErrors errors{0.04, -0.02};
+    const DeadReckoningStep step = dead_reckon(start, errors, moved, parameters);
+    EXPECT_TRUE(near(step.pose, move_noisily(start, moved, {}, errors), 1e-12));
+    const double h = 1e-6;  // and the chord's length hardly depends on the turn: 2e-4
+    for (int i = 0; i < kErrorStates; ++i) {
+      ErrorState d = ErrorState::Zero();
+      d(i) = h;
+      const Pose2 after = move_noisily({start.x + d(0), start.y + d(1), start.yaw + d(2)}, moved, {},
+                                       {errors.speed_scale + d(3), errors.yaw_rate_bias_radps + d(4)});
+      EXPECT_NEAR(step.transition(0, i), (after.x - step.pose.x) / h, 2e-4) << i;
+      EXPECT_NEAR(step.transition(1, i), (after.y - step.pose.y) / h, 2e-4) << i;
+      EXPECT_NEAR(step.transition(2, i), angle_difference(after.yaw, step.pose.yaw) / h, 2e-4) << i;
+    }
+    RandomEngine engine = make_engine(9);
+    std::vector<double> x, y, yaw;
+    for (int k = 0; k < 20000; ++k) {
+      const Pose2 drawn = move_noisily(start, moved, draw_motion_noise(engine), errors);
+      x.push_back(drawn.x - step.pose.x);
+      y.push_back(drawn.y - step.pose.y);
+      yaw.push_back(angle_difference(drawn.yaw, step.pose.yaw));
+    }
+    EXPECT_TRUE(has_moments(x, 0.0, step.noise(0, 0)));
+    EXPECT_TRUE(has_moments(y, 0.0, step.noise(1, 1)));
+    EXPECT_TRUE(has_moments(yaw, 0.0, step.noise(2, 2)));
+    EXPECT_EQ(step.noise(3, 3), 0.1 * parameters.speed_scale_walk * parameters.speed_scale_walk);
+    EXPECT_EQ(step.noise(4, 4), 0.1 * parameters.yaw_rate_bias_walk * parameters.yaw_rate_bias_walk);
+  }
+}
+
+TEST(DeadReckoning, ParkedRobotWalksAsMuchAsItsPlaceMayBeWrong) {
+  const MotionStep parked = make_motion_step({0.0, 0.005}, 4.0, {}, {});  // what a gyroscope says at a standstill
+  const DeadReckoningStep step = dead_reckon({1.0, 2.0, 3.0}, {0.1, 0.01}, parked, {});
+  EXPECT_TRUE((step.pose == Pose2{1.0, 2.0, 3.0}));
+  EXPECT_TRUE(step.transition.isIdentity());
+  EXPECT_NEAR(step.noise(0, 0), 4.0 * 0.03 * 0.03, 1e-12);
+  EXPECT_EQ(step.noise(2, 2), 0.0);
+}
+
 // Wheels that stand have no yaw-rate bias: a parked robot does not turn.
 TEST(DeadReckoning, StandingRobotStays) {
   const DeadReckoningStep step = dead_reckon({1.0, 2.0, 3.0}, {0.1, 0.01}, {0.0, 0.0}, 10.0, {});

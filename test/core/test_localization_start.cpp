@@ -55,6 +55,19 @@ TEST(LocalizationPipeline, ParkedRobotStartsWithoutAHeadingAfterItsTimeout) {
   EXPECT_FALSE(rig.pipeline.report().healthy);
 }
 
+TEST(LocalizationPipeline, ParkedRobotTakesItsHeadingFromItsFirstMotion) {
+  Rig rig("{datum: [33.0, 130.0, 20.0], initialization_timeout: 20.0}");
+  for (int k = -250; k < 0; ++k) {  // parked where it will start
+    if (k % 10 == 0) rig.pipeline.add_fix(raw_fix(Rig::at(0.1 * k), {0.0, 0.0}));
+    rig.pipeline.add_odometry({Rig::at(0.1 * k), {}, {}});
+  }
+  ASSERT_EQ(rig.fake->starts.size(), 1u);
+  rig.run(0.0, 60.0);
+  ASSERT_EQ(rig.fake->starts.size(), 2u);  // and not again
+  EXPECT_LT(std::sqrt(rig.fake->starts[1].covariance(2, 2)), 0.2);
+  EXPECT_TRUE(near(rig.pipeline.take_outputs().back().estimate.pose, Rig::truth(60.0), 0.3));
+}
+
 TEST(LocalizationPipeline, AntennaOffsetIsTakenOffAtTheStart) {
   Rig rig("{datum: [33.0, 130.0, 20.0], antenna_offset: [1.5, 0.8]}");
   for (int k = 0; k <= 400 && !rig.pipeline.initialized(); ++k) {

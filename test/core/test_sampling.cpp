@@ -33,6 +33,85 @@ TEST(SampleMotion, IsMoveNoisilyDrawByDraw) {
   }
 }
 
+TEST(SampleMotion, WithKnownErrorsIsMoveNoisilyOfTheCorrectedTwist) {
+  for (const MotionModel model : {MotionModel::kBicycle, MotionModel::kVelocity}) {
+    MotionParameters parameters;
+    parameters.motion_model = model;
+    const MotionStep step = make_motion_step({2.0, 0.4}, 0.05, parameters);
+    RandomEngine engine = make_engine(1);
+    ParticleSet particles = random_particles(500, engine);
+    const ParticleSet before = particles;
+    OdometryErrorSet errors(500);
+    for (std::size_t i = 0; i < 500; ++i) {
+      errors.speed_scale[i] = 0.1 * draw_normal(engine);
+      errors.yaw_rate_bias[i] = 0.1 * draw_normal(engine);
+    }
+    const OdometryErrorSet known = errors;
+    RandomEngine array_engine = make_engine(2);
+    RandomEngine plain_engine = make_engine(2);
+    sample_motion(particles, errors, step, array_engine);
+    for (std::size_t i = 0; i < particles.size(); ++i) {
+      const OdometryErrors own{known.speed_scale[i], known.yaw_rate_bias[i]};
+      const Pose2 plain = move_noisily(before.pose(i), step, draw_motion_noise(plain_engine), own);
+      ASSERT_TRUE(near(particles.pose(i), plain, 1e-13)) << i;
+    }
+    EXPECT_EQ(array_engine, plain_engine);
+    EXPECT_EQ(errors.speed_scale, known.speed_scale);
+    EXPECT_EQ(errors.yaw_rate_bias, known.yaw_rate_bias);
+  }
+}
+
+// Straight on, what a path says of the speed's scale is a linear regression.
+TEST(SampleMotion, LearnsFromEachPathWhatItSaysOfTheErrors) {
+  MotionParameters parameters;
+  parameters.odom_alpha3 = parameters.odom_alpha4 = parameters.odom_alpha5 = parameters.odom_alpha6 = 0.0;
+  const double sigma = 0.05;
+  OdometryErrorParameters prior;
+  prior.speed_scale_sigma = sigma;
+  prior.yaw_rate_bias_sigma = 0.0;
+  OdometryErrorSet errors(200);
+  errors.reset(prior);
+  ParticleSet particles(200);
+  RandomEngine engine = make_engine(4);
+  double precision = 1.0 / (sigma * sigma);
+  std::vector<double> weighted(200, 0.0);
+  for (const double speed : {1.0, 2.0, 0.5, 0.0, -1.0}) {
+    const MotionStep step = make_motion_step({speed, 0.0}, 0.1, parameters);
+    const std::vector<double> before = particles.x;
+    sample_motion(particles, errors, step, engine);
+    if (speed == 0.0) continue;
+    const double variance = step.speed_sigma * step.speed_sigma;
+    precision += speed * speed / variance;
+    for (std::size_t i = 0; i < 200; ++i) {
+      weighted[i] += ((particles.x[i] - before[i]) / 0.1 - speed) * speed / variance;
+    }
+  }
+  EXPECT_NEAR(errors.speed_scale_variance * precision, 1.0, 1e-9);
+  for (std::size_t i = 0; i < 200; ++i) EXPECT_NEAR(errors.speed_scale[i], weighted[i] / precision, 1e-12);
+}
+
+// Where a particle is after many steps varies by noise and errors together.
+TEST(SampleMotion, ScattersByTheErrorsAsIfEachWereDrawnOnce) {
+  OdometryErrorParameters prior;
+  prior.speed_scale_sigma = 0.1;
+  prior.yaw_rate_bias_sigma = 0.02;
+  OdometryErrorSet errors(20000);
+  errors.reset(prior);
+  ParticleSet particles(20000);
+  RandomEngine engine = make_engine(4);
+  MotionParameters parameters;
+  parameters.odom_noise_scale = 0.1;
+  const MotionStep step = make_motion_step({1.0, 0.0}, 0.5, parameters);
+  for (int k = 0; k < 10; ++k) sample_motion(particles, errors, step, engine);
+  const double noise = 10.0 * 0.25;  // sum of the squared durations
+  EXPECT_TRUE(has_moments(
+      particles.yaw, 0.0,
+      25.0 * 0.02 * 0.02 + noise * (step.input_sigma * step.input_sigma + step.yaw_rate_sigma * step.yaw_rate_sigma)));
+  std::vector<double> scale(20000);
+  for (std::size_t i = 0; i < 20000; ++i) scale[i] = errors.speed_scale[i];
+  EXPECT_TRUE(has_moments(scale, 0.0, 0.01 - errors.speed_scale_variance));
+}
+
 struct Ring {
   static constexpr std::size_t kCount = 20000;
   static constexpr double kRadius = 4.0;

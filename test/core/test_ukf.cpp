@@ -16,7 +16,7 @@ TEST(Ukf, LinearCaseEqualsTheKalmanFilter) {
            "{odom_alpha1: 0.01, odom_alpha2: 0.0, odom_alpha3: 0.0, odom_alpha4: 0.0, odom_alpha5: 0.0, "
            "odom_alpha6: 0.0, odom_noise_interval: 0.5}");
   auto p = plain();
-  p.yaw_rate_bias_sigma = p.yaw_rate_bias_walk = 0.0;
+  p.odometry.yaw_rate_bias_sigma = p.odometry.yaw_rate_bias_walk = 0.0;
   for (const double alpha : {1.0, 0.5, 0.1}) {
     p.ukf_alpha = alpha;
     Ukf ukf(p, motion);
@@ -143,8 +143,8 @@ struct Nees {
 Nees nees_of_drive(const UkfParameters& p, std::uint64_t seed) {
   RandomEngine engine = make_engine(seed, 4);
   const MotionParameters motion;
-  const double scale = p.speed_scale_sigma * draw_normal(engine);
-  const double bias = p.yaw_rate_bias_sigma * draw_normal(engine);
+  const double scale = p.odometry.speed_scale_sigma * draw_normal(engine);
+  const double bias = p.odometry.yaw_rate_bias_sigma * draw_normal(engine);
   constexpr double kSigma_m = 1.5;
   Pose2 truth{0.0, 0.0, uniform_between(-kPi, kPi, engine)};
   Ukf ukf(p, motion);
@@ -156,7 +156,7 @@ Nees nees_of_drive(const UkfParameters& p, std::uint64_t seed) {
   for (int i = 1; i <= 600; ++i) {
     const Twist2 twist{1.5, 0.3 * std::sin(0.01 * i)};
     MotionStep step = make_motion_step(twist, 0.1, motion);
-    const double factor = std::sqrt(p.motion_noise_factor);
+    const double factor = std::sqrt(p.odometry.motion_noise_factor);
     step.speed_sigma *= factor;
     step.input_sigma *= factor;
     step.yaw_rate_sigma *= factor;

@@ -20,7 +20,7 @@ inline UkfParameters plain() {
   UkfParameters p;
   p.outliers = OutlierPolicy::kNone;
   p.fix_correlation_time = 0.0;
-  p.motion_noise_factor = 1.0;
+  p.odometry.motion_noise_factor = 1.0;
   return p;
 }
 

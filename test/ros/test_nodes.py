@@ -13,6 +13,8 @@ import rostest
 NODES = {
     "particle_filter_node": (["_ring_share:=2.0", "_particle_count:=0", "_modus:=paper", "_mode:=papers"],
                              ["ring_share = 2", "particle_count = 0", "did you mean mode?", "literal, paper, conventional"]),
+    "imm_ekf_node": (["_jump_share:=2.0", "_mode:=switching", "_fast_bias_time:=0.0"],
+                     ["jump_share = 2", "mode: no such parameter", "fast_bias_time = 0"]),
     "gps_bias_node": (["_shadow_sigma:=-1.0", "_bias_input:=residuals", "_gate:=0.5"],
                       ["shadow_sigma = -1", "residual, position", "gate: no such parameter"]),
     "occlusion_node": (["_voxel_size:=-1.0", "_model:=best", "_windw:=3.0"],

@@ -35,7 +35,8 @@ PaperExperimentConditions read_paper_conditions(const PaperFiles& files);
 /// A way to estimate the pose, by the name that tables and files use.
 struct PaperMethod {
   enum class Kind {
-    kFilter,
+    kFilter,         ///< a particle filter
+    kImm,            ///< an interacting multiple model, of the particle filter's parameters
     kDeadReckoning,  ///< the inputs alone, from a start as uncertain as one particle's
     kOracleZone,     ///< knows the zone: drops the fix in the shadow
     kOracle,         ///< knows zone and bias: takes the bias off and uses the right noise

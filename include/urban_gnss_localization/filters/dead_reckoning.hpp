@@ -3,7 +3,7 @@
 #include <Eigen/Core>
 
 #include "urban_gnss_localization/common/parameters.hpp"
-#include "urban_gnss_localization/motion/motion_model.hpp"
+#include "urban_gnss_localization/motion/odometry_errors.hpp"
 
 namespace urban_gnss {
 
@@ -34,12 +34,6 @@ struct DeadReckoningParameters {
   void check(std::vector<std::string>&) const {}
 };
 
-/// What the odometry is wrong by: true speed = (1 + speed_scale) measured, true yaw rate = measured + yaw_rate_bias.
-struct OdometryErrors {
-  double speed_scale{0.0};          ///< 1
-  double yaw_rate_bias_radps{0.0};  ///< rad/s
-};
-
 /// Order of the error states: x (m), y (m), yaw (rad), speed scale (1), yaw-rate bias (rad/s).
 inline constexpr int kErrorStates = 5;
 using ErrorState = Eigen::Matrix<double, kErrorStates, 1>;
@@ -61,8 +55,14 @@ bool is_standstill(const Twist2& twist);
 DeadReckoningStep dead_reckon(const Pose2& pose, const OdometryErrors& errors, const Twist2& measured,
                               double duration_s, const DeadReckoningParameters& parameters);
 
+/// The same with the noise of the motion model, eq. (5)-(7) of Nishida et al., linearised; parked where the robot is.
+DeadReckoningStep dead_reckon(const Pose2& pose, const OdometryErrors& errors, const MotionStep& step,
+                              const OdometryErrorParameters& parameters);
+
 /// Covariance of pose and odometry errors at a start whose pose has the given covariance.
 ErrorCovariance initial_error_covariance(const Eigen::Matrix3d& pose_covariance,
                                          const DeadReckoningParameters& parameters);
+ErrorCovariance initial_error_covariance(const Eigen::Matrix3d& pose_covariance,
+                                         const OdometryErrorParameters& parameters);
 
 }  // namespace urban_gnss

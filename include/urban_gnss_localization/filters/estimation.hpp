@@ -36,6 +36,9 @@ class ParticleClusters {
   std::uint32_t count() const { return count_; }
   /// Weight of the heaviest cluster, 0 to 1.
   double heaviest_mass() const { return heaviest_mass_; }
+  bool is_in_heaviest(std::size_t particle) const {
+    return heaviest_ != kNone && cell_of_particle_[particle] == heaviest_;
+  }
   /// Mean pose of the heaviest cluster (angle on the circle).
   Pose2 heaviest_mean(const ParticleSet& particles) const;
 

@@ -22,6 +22,11 @@ struct FixMeasurement {
   Stamp stamp{0};             ///< of the fix, for what is published about it
 };
 
+/// Whether a filter can take the fix: all finite, with a positive definite covariance.
+bool is_usable(const FixMeasurement& fix);
+/// Whether a filter can move by the step: finite, for a positive time.
+bool is_usable(const Twist2& twist, double duration_s);
+
 /// How sure a localizer is of what it publishes. NaN and 0 where a method has no such number.
 struct LocalizerHealth {
   double heading_sigma_rad{std::numeric_limits<double>::quiet_NaN()};  ///< circular standard deviation

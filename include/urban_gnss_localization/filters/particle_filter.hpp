@@ -2,9 +2,10 @@
 
 #include <cstdint>
 
-#include "urban_gnss_localization/filters/estimation.hpp"
+#include "urban_gnss_localization/filters/bias_modes.hpp"
 #include "urban_gnss_localization/filters/fix_likelihood.hpp"
-#include "urban_gnss_localization/filters/localizer.hpp"
+#include "urban_gnss_localization/filters/fix_noise_model.hpp"
+#include "urban_gnss_localization/filters/particle_localizer.hpp"
 #include "urban_gnss_localization/filters/resampling.hpp"
 #include "urban_gnss_localization/filters/sampling.hpp"
 
@@ -14,6 +15,7 @@ enum class ParticleFilterMode {
   kLiteral,       ///< the text as printed
   kPaper,         ///< its reading that works
   kConventional,  ///< eq. (46), (47): motion proposal, direct likelihood
+  kSwitching,     ///< no mode of ParticleFilter: SwitchingParticleFilter
 };
 EnumNames<ParticleFilterMode> enum_names(ParticleFilterMode);
 
@@ -31,9 +33,7 @@ struct ParticleFilterParameters {
   double ring_share{0.05};                               ///< share of particles drawn on the ring, eq. (22)
   LikelihoodChoice likelihood{LikelihoodChoice::kAuto};  ///< auto: printed (literal, conventional) or product (paper)
   Switch use_gps_heading{Switch::kAuto};  ///< theta_GPS, eq. (12); auto: with the sums, not with the product
-  bool use_fix_covariance{true};          ///< Sigma_b from each fix instead of direct_sigma
-  double direct_sigma{3.0};               ///< m, sigma_b
-  double shadow_sigma{3.0};               ///< m, sigma_s
+  FixSigmaParameters fix;                 ///< sigma_b, sigma_s
   double gps_heading_sigma{0.1};          ///< rad, sigma_p
   double ess_threshold{5.0};              ///< resampling below this effective sample size, eq. (39)
   ResamplingScheme resampling{ResamplingScheme::kMultinomial};
@@ -42,6 +42,9 @@ struct ParticleFilterParameters {
   double gate_probability{0.99};  ///< conventional mode: gate on the NIS; 1 switches it off
   double gate_timeout{5.0};       ///< s of nothing but rejections after which it restarts on the fix
   int seed{1};
+  FixNoiseModelParameters noise;     ///< of the mode switching
+  BiasModeParameters modes;          ///< of the mode switching
+  OdometryErrorParameters odometry;  ///< of the mode switching
 
   template <class V>
   void visit(V& v) {
@@ -50,9 +53,7 @@ struct ParticleFilterParameters {
     v("ring_share", ring_share, between(0.0, 1.0));
     v("likelihood", likelihood);
     v("use_gps_heading", use_gps_heading);
-    v("use_fix_covariance", use_fix_covariance);
-    v("direct_sigma", direct_sigma, positive());
-    v("shadow_sigma", shadow_sigma, positive());
+    fix.visit(v);
     v("gps_heading_sigma", gps_heading_sigma, positive());
     v("ess_threshold", ess_threshold, non_negative());
     v("resampling", resampling);
@@ -61,6 +62,9 @@ struct ParticleFilterParameters {
     v("gate_probability", gate_probability, Range{0.0, 1.0, true});
     v("gate_timeout", gate_timeout, positive());
     v("seed", seed, any_number());
+    noise.visit(v);
+    modes.visit(v);
+    odometry.visit(v);
   }
   void check(std::vector<std::string>& faults) const;
 
@@ -70,9 +74,9 @@ struct ParticleFilterParameters {
 };
 
 /// The particle filter of Nishida et al., Algorithm 1: sample, weigh, estimate, resample.
-class ParticleFilter : public Localizer {
+class ParticleFilter : public ParticleLocalizer {
  public:
-  /// Requires parameters without faults.
+  /// Requires parameters without faults, and another mode than kSwitching.
   ParticleFilter(const ParticleFilterParameters& parameters, const MotionParameters& motion);
 
   const char* name() const override { return "particle_filter"; }
@@ -81,13 +85,6 @@ class ParticleFilter : public Localizer {
   void initialize(const PoseEstimate& start) override;
   void move(const Twist2& twist, double duration_s) override;
   FixVerdict correct(const FixMeasurement& fix) override;
-  Pose2 pose() const override { return estimate_; }
-  PoseEstimate estimate() const override;
-  LocalizerHealth health() const override;
-
-  const ParticleSet& particles() const { return particles_; }
-  /// Before resampling, at the last fix.
-  double effective_sample_size() const { return effective_sample_size_; }
 
  private:
   FixLikelihood likelihood_of(const FixMeasurement& fix) const;
@@ -99,15 +96,11 @@ class ParticleFilter : public Localizer {
   MotionParameters motion_;
   double nis_threshold_;
   RandomEngine engine_;
-  ParticleSet particles_;
   RingSampler ring_;
   Resampler resampler_;
-  ParticleClusters clusters_;
 
-  Pose2 estimate_;  ///< x_est of the last fix, moved without noise since: f(x_est, u) of eq. (23)
   Eigen::Vector2d last_fix_position_{Eigen::Vector2d::Zero()};  ///< estimated position at the last fix, for eq. (12)
   double turn_since_fix_{0.0};                                  ///< rad, for eq. (12)
-  double effective_sample_size_{0.0};                           ///< before resampling
   double last_accepted_time_s_{0.0};
   bool had_fix_{false};
 };

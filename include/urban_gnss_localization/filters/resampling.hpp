@@ -23,6 +23,9 @@ class Resampler {
   /// Requires normalised weights.
   void resample(ParticleSet& particles, RandomEngine& engine);
 
+  /// Gives numbers that stand beside the poses the parents of the last call of resample().
+  void gather(std::vector<double>& values);
+
   /// Which old particle each new one is a copy of, ascending: of the last call.
   const std::vector<std::uint32_t>& parents() const { return parents_; }
 

@@ -6,6 +6,7 @@
 #include "urban_gnss_localization/common/parameters.hpp"
 #include "urban_gnss_localization/filters/localizer.hpp"
 #include "urban_gnss_localization/filters/unscented.hpp"
+#include "urban_gnss_localization/motion/odometry_errors.hpp"
 
 namespace urban_gnss {
 
@@ -19,19 +20,15 @@ EnumNames<OutlierPolicy> enum_names(OutlierPolicy);
 
 struct UkfParameters {
   OutlierPolicy outliers{OutlierPolicy::kStudentT};
-  double student_dof{1.0};            ///< degrees of freedom of the Student-t distribution; large ones are Gaussian
-  double gate_probability{0.99};      ///< that a good fix is not called an outlier; 1: none is
-  double gate_timeout{5.0};           ///< s of nothing but rejections after which it restarts on the fix
-  double fix_correlation_time{1.0};   ///< s, over which the error of fixes stays the same; 0: independent errors
-  double motion_noise_factor{0.1};    ///< on the motion model's variances, most of which are scale and bias
-  double speed_scale_sigma{0.03};     ///< initial standard deviation of the odometry's relative speed error
-  double speed_scale_walk{2e-4};      ///< its random walk, 1/sqrt(s)
-  double yaw_rate_bias_sigma{0.005};  ///< rad/s, initial standard deviation of the odometry's yaw-rate error
-  double yaw_rate_bias_walk{3e-5};    ///< its random walk, rad/s/sqrt(s)
-  double parked_walk{0.03};           ///< m/sqrt(s), random walk of the position at a standstill
-  double ukf_alpha{0.5};              ///< spread of the sigma points
-  double ukf_beta{2.0};               ///< 2 is best for Gaussian errors
-  double ukf_kappa{0.0};              ///< secondary spread
+  double student_dof{1.0};           ///< degrees of freedom of the Student-t distribution; large ones are Gaussian
+  double gate_probability{0.99};     ///< that a good fix is not called an outlier; 1: none is
+  double gate_timeout{5.0};          ///< s of nothing but rejections after which it restarts on the fix
+  double fix_correlation_time{1.0};  ///< s, over which the error of fixes stays the same; 0: independent errors
+  /// All noise of the odometry is in the motion model, as in the paper.
+  OdometryErrorParameters odometry{0.1, 0.03, 2e-4, 0.005, 3e-5, 0.0, 0.0, 0.03};
+  double ukf_alpha{0.5};  ///< spread of the sigma points
+  double ukf_beta{2.0};   ///< 2 is best for Gaussian errors
+  double ukf_kappa{0.0};  ///< secondary spread
 
   template <class V>
   void visit(V& v) {
@@ -40,12 +37,7 @@ struct UkfParameters {
     v("gate_probability", gate_probability, Range{0.0, 1.0, true});
     v("gate_timeout", gate_timeout, positive());
     v("fix_correlation_time", fix_correlation_time, non_negative());
-    v("motion_noise_factor", motion_noise_factor, non_negative());
-    v("speed_scale_sigma", speed_scale_sigma, non_negative());
-    v("speed_scale_walk", speed_scale_walk, non_negative());
-    v("yaw_rate_bias_sigma", yaw_rate_bias_sigma, non_negative());
-    v("yaw_rate_bias_walk", yaw_rate_bias_walk, non_negative());
-    v("parked_walk", parked_walk, non_negative());
+    odometry.visit(v);
     v("ukf_alpha", ukf_alpha, between(1e-3, 1.0));
     v("ukf_beta", ukf_beta, non_negative());
     v("ukf_kappa", ukf_kappa, non_negative());

@@ -164,6 +164,9 @@ class LocalizationPipeline {
   void initialize_with(const PendingFix& pending);
   void remember_for_start(const PendingFix& pending);
   bool try_start(const PendingFix& pending);
+  /// A robot that was parked at its start has its heading as soon as it has moved: whatever the filter made of a heading
+  /// that nobody knew is given up for it.
+  bool start_with_heading(const PendingFix& pending);
   bool restart_if_lost(const PendingFix& pending);
   void start(const PoseEstimate& pose, const std::string& how);
   void forget_start();
@@ -204,6 +207,7 @@ class LocalizationPipeline {
 
   bool initialized_{false};
   bool lost_{false};
+  bool heading_unknown_{false};  ///< the last start had none
   std::optional<Stamp> far_since_;  ///< since when every fix has been farther than max_bias_radius
   std::optional<Stamp> last_used_;
   FixVerdict last_verdict_;

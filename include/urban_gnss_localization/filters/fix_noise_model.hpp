@@ -1,0 +1,68 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+
+#include "urban_gnss_localization/common/parameters.hpp"
+#include "urban_gnss_localization/motion/motion_model.hpp"
+
+namespace urban_gnss {
+
+/// How a receiver's declared covariance is related to the errors of its fixes.
+struct FixNoiseModelParameters {
+  /// 1, by how much a fix changes the logarithm of the factor on the declared covariance; 0: the factor stays 1
+  double fix_scale_rate{0.03};
+  double fix_scale_limit{20.0};          ///< factor by which declared standard deviations may be wrong, either way
+  double fix_correlation_time{3.0};      ///< s, over which the error of a fix stays the same; 0: independent errors
+  double parked_correlation_time{30.0};  ///< s, the same while the robot stands: reflections change little then (F34)
+
+  template <class V>
+  void visit(V& v) {
+    v("fix_scale_rate", fix_scale_rate, between(0.0, 1.0));
+    v("fix_scale_limit", fix_scale_limit, at_least(1.0));
+    v("fix_correlation_time", fix_correlation_time, non_negative());
+    v("parked_correlation_time", parked_correlation_time, non_negative());
+  }
+  void check(std::vector<std::string>&) const {}
+};
+
+/// What a fix is worth: the covariance that its receiver declares follows its errors up and down, but is too small
+/// or too large by a factor, which is learnt, and errors are correlated in time.
+///
+/// The factor k is such that half of the fixes have a normalised innovation below the median of the chi-squared
+/// distribution (2 ln 2): each fix raises or lowers ln k by fix_scale_rate (stochastic approximation of a quantile,
+/// Robbins and Monro 1951). Outliers, however far, weigh no more than others, and the half of the fixes that are the
+/// worst of all may be anything.
+///
+/// Fixes with an error that is a first-order Markov process are together worth as much as independent ones whose
+/// covariance is (1 + a) / (1 - a) times as large, a = exp(-interval / correlation time).
+class FixNoiseModel {
+ public:
+  /// Requires parameters without faults.
+  explicit FixNoiseModel(const FixNoiseModelParameters& parameters) : parameters_(parameters) {}
+
+  /// Forgets the fixes, not the receiver: the factor is kept.
+  void restart();
+  /// Odometry since the last fix: whether the robot stands.
+  void move(const Twist2& twist, double duration_s);
+
+  double scale() const { return scale_; }
+  /// Factor on the covariance of a fix at `time_s` by which correlation lowers its worth, at least 1.
+  double correlation_inflation(double time_s) const;
+
+  /// The fix at `time_s` was used, with a share `exceeding` (0 to 1) of the innovation's NIS, at k times the declared
+  /// covariance, beyond kMedianNis.
+  void learn(double time_s, double exceeding);
+
+  /// Median of the chi-squared distribution of 2 degrees of freedom.
+  static constexpr double kMedianNis = 1.3862943611198906;
+
+ private:
+  FixNoiseModelParameters parameters_;
+  double scale_{1.0};
+  std::optional<double> last_s_;
+  double moved_m_{0.0};
+  double elapsed_s_{0.0};
+};
+
+}  // namespace urban_gnss

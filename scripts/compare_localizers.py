@@ -1,0 +1,344 @@
+#!/usr/bin/env python3
+"""Every localizer on every real recording: tables, plots and the tables of docs/real_data.md.
+
+usage: compare_localizers.py OUTPUT [--data DIR] [--docs FILE] [options]
+
+DIR (default: $URBAN_GNSS_DATA) holds one folder a recording, as csv_to_bag reads it; those without truth.csv are left
+out. OUTPUT gets the bags, the runs, one figure a recording, metrics.json and report.html. With --docs the tables between
+the markers of that Markdown file are renewed, and its figures are written beside it.
+
+The workspace must be sourced, or URBAN_GNSS_PROGRAMS be the folder of the built programs.
+"""
+
+import argparse
+import concurrent.futures
+import math
+import os
+import re
+import subprocess
+import sys
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+
+import numpy as np  # noqa: E402
+
+import report_common as common  # noqa: E402
+from report_common import plt  # noqa: E402
+
+NEEDED = ("gnss.csv", "odom.csv", "truth.csv", "meta.json")
+ESTIMATE = "odometry/filtered"
+RAW_FIX = "raw fix"
+
+# Name in the tables, and what replay is called with.
+METHODS = {
+    "EKF": ["--localizer", "complementary_ekf", "--set", "mode=standard"],
+    "gated EKF": ["--localizer", "complementary_ekf", "--set", "mode=gated"],
+    "complementary EKF": ["--localizer", "complementary_ekf"],
+    "UKF": ["--localizer", "ukf"],
+    "paper": ["--localizer", "particle_filter", "--set", "mode=paper"],
+    "IMM": ["--localizer", "imm_ekf"],
+    "switching": ["--localizer", "particle_filter", "--set", "mode=switching"],
+}
+COLOURS = {"EKF": "#e69f00", "gated EKF": "#843c39", "complementary EKF": "#d55e00", "UKF": "#7b4fd6",
+           "paper": "#0072b2", "IMM": "#56b4e9", "switching": "#009e73", RAW_FIX: common.FIX_COLOUR}
+
+# What an information is worth: the method that does best without it.
+ABLATED = "IMM"
+ABLATIONS = {
+    "odometry errors as states": ["speed_scale_sigma=0.0", "speed_scale_walk=0.0", "yaw_rate_bias_sigma=0.0",
+                                  "yaw_rate_bias_walk=0.0"],
+    "formal covariance": ["use_fix_covariance=false", "direct_sigma=10.0", "shadow_sigma=10.0"],
+    "learnt scale": ["fix_scale_rate=0.0"],
+    "formal covariance, learnt scale": ["use_fix_covariance=false", "direct_sigma=10.0", "shadow_sigma=10.0",
+                                        "fix_scale_rate=0.0"],
+    "correlation of errors": ["fix_correlation_time=0.0", "parked_correlation_time=0.0"],
+    "more of it when parked": ["parked_correlation_time=3.0"],
+    "heavy tails": ["student_dof=1.0e+9"],
+    "outliers": ["outlier_share=0.0"],
+    "heavy tails, outliers": ["student_dof=1.0e+9", "outlier_share=0.0"],
+    "biased modes": ["direct_time=1.0e+15"],
+}
+
+DIVERGED_M = 100.0
+DIVERGED_S = 30.0
+SMALLEST_ERROR_M = 0.1
+
+
+class Scores:
+    """The errors of one method on one recording."""
+
+    def __init__(self, t, error):
+        known = np.isfinite(error)
+        self.t, self.error = np.asarray(t)[known], np.asarray(error)[known]
+
+    def percentile(self, percent):
+        """The error below which `percent` of the samples lie; NaN without samples."""
+        return float(np.percentile(self.error, percent)) if len(self.error) else float("nan")
+
+    def has_diverged(self):
+        """Whether the error stayed above DIVERGED_M for DIVERGED_S."""
+        since = None
+        for t, error in zip(self.t, self.error):
+            if error <= DIVERGED_M:
+                since = None
+                continue
+            since = t if since is None else since
+            if t - since >= DIVERGED_S:
+                return True
+        return False
+
+    def cell(self):
+        """median / 95 % / maximum as text."""
+        if not len(self.error):
+            return "–"
+        text = "{:.1f} / {:.1f} / {:.0f}".format(self.percentile(50), self.percentile(95), self.percentile(100))
+        return text + (" †" if self.has_diverged() else "")
+
+
+def program(name):
+    """The command that starts one of the package's programs."""
+    programs = os.environ.get("URBAN_GNSS_PROGRAMS")
+    return [os.path.join(programs, name)] if programs else ["rosrun", "urban_gnss_localization", name]
+
+
+def call(*command):
+    """Run a program; a failure ends everything with its last line."""
+    try:
+        done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, universal_newlines=True)
+    except OSError as error:
+        raise common.ReportError("{}: {}".format(command[0], error.strerror))
+    if done.returncode != 0:
+        lines = (done.stderr.strip() or done.stdout.strip() or "failed without a word").splitlines()
+        raise common.ReportError("{}: {}".format(os.path.basename(command[0]), lines[-1]))
+
+
+def find_recordings(directory, chosen):
+    """Names of the folders that can be evaluated, in alphabetical order."""
+    if not directory or not os.path.isdir(directory):
+        raise common.ReportError("{}: no folder of recordings (--data or URBAN_GNSS_DATA)".format(directory or "?"))
+    found = sorted(name for name in os.listdir(directory)
+                   if all(os.path.isfile(os.path.join(directory, name, file)) for file in NEEDED))
+    for name in chosen:
+        if name not in found:
+            raise common.ReportError("{}: no recording {} with {}".format(directory, name, ", ".join(NEEDED)))
+    found = [name for name in found if not chosen or name in chosen]
+    if not found:
+        raise common.ReportError("{}: no recording with {}".format(directory, ", ".join(NEEDED)))
+    return found
+
+
+def make_bag(folder, bag):
+    """Convert a recording, unless that has been done since it changed."""
+    files = [os.path.join(folder, name) for name in os.listdir(folder)]
+    if os.path.exists(bag) and os.path.getmtime(bag) > max(os.path.getmtime(file) for file in files):
+        return
+    call(*program("csv_to_bag"), folder, bag)
+
+
+def file_name(method):
+    """The method's name as that of a file."""
+    return re.sub(r"\W+", "_", method)
+
+
+def run_recording(data, output, recording, methods, overrides):
+    """Run and score every method on one recording; the errors by method, the raw fixes among them."""
+    folder = os.path.join(output, recording)
+    os.makedirs(folder, exist_ok=True)
+    bag = os.path.join(folder, "recording.bag")
+    make_bag(os.path.join(data, recording), bag)
+    runs = []
+    for method, arguments in methods.items():
+        runs.append(os.path.join(folder, file_name(method) + ".bag"))
+        call(*program("replay"), bag, "--output", runs[-1], *arguments, *overrides)
+    call(*program("evaluate"), *runs, bag, "--truth", bag, "--output", folder, "--no-plots")
+    for run in runs:
+        os.remove(run)
+    return read_scores(folder, methods)
+
+
+def read_scores(folder, methods):
+    """The error series that evaluate wrote; also where the robot was."""
+    scores, tracks = {}, {}
+    for method in methods:
+        stem = file_name(method) + "_"
+        errors = common.read_csv(os.path.join(folder, "data", "errors_" + stem + ESTIMATE.replace("/", "_") + ".csv"),
+                                 ("t", "position_error_m", "est_x", "est_y", "truth_x", "truth_y"))
+        scores[method] = Scores(errors["t"], errors["position_error_m"])
+        tracks[method] = errors
+    fixes = common.read_csv(os.path.join(folder, "data", "errors_recording_gps_fix.csv"),
+                            ("t", "position_error_m", "est_x", "est_y"))
+    scores[RAW_FIX] = Scores(fixes["t"], fixes["position_error_m"])
+    tracks[RAW_FIX] = (fixes["est_x"], fixes["est_y"])
+    return scores, tracks
+
+
+def plot_recording(path, title, scores, tracks):
+    """Trajectories beside the errors over time."""
+    figure, (left, right) = plt.subplots(1, 2, figsize=(13.0, 4.6), gridspec_kw={"width_ratios": (1.0, 1.5)})
+    longest = max((track for name, track in tracks.items() if name != RAW_FIX), key=len)
+    x, y = common.finite(longest["truth_x"]), common.finite(longest["truth_y"])
+    left.plot(tracks[RAW_FIX][0], tracks[RAW_FIX][1], ".", color=common.FIX_COLOUR, markersize=2)
+    for name, track in tracks.items():
+        if name != RAW_FIX:
+            left.plot(track["est_x"], track["est_y"], color=COLOURS.get(name), linewidth=0.9)
+    left.plot(longest["truth_x"], longest["truth_y"], color=common.TRUTH_COLOUR, linewidth=1.2)
+    if len(x):
+        margin = max(15.0, 0.1 * max(np.ptp(x), np.ptp(y)))
+        left.set_xlim(np.min(x) - margin, np.max(x) + margin)
+        left.set_ylim(np.min(y) - margin, np.max(y) + margin)
+    left.set_aspect("equal", adjustable="datalim")
+    left.set_xlabel("east [m]")
+    left.set_ylabel("north [m]")
+    for name, score in scores.items():
+        marker = {"linestyle": "", "marker": ".", "markersize": 2} if name == RAW_FIX else {"linewidth": 1.1}
+        right.plot(score.t, np.maximum(score.error, SMALLEST_ERROR_M), color=COLOURS.get(name), label=name, **marker)
+    right.set_yscale("log")
+    common.plain_ticks(right.yaxis)
+    right.set_xlabel("time [s]")
+    right.set_ylabel("position error [m]")
+    figure.suptitle(title, fontsize=11)
+    for axes in (left, right):
+        common.light_grid(axes)
+    common.legend_beside(right)
+    common.save_figure(figure, path)
+
+
+def plot_overview(path, results, methods):
+    """Median and 95 % of every method on every recording."""
+    figure, axes = plt.subplots(figsize=(11.0, 4.2))
+    names = [RAW_FIX] + list(methods)
+    width = 0.8 / len(names)
+    for i, name in enumerate(names):
+        places = np.arange(len(results)) - 0.4 + (i + 0.5) * width
+        median = np.array([scores[name].percentile(50) for scores in results.values()])
+        upper = np.array([scores[name].percentile(95) for scores in results.values()])
+        axes.vlines(places, median, upper, color=COLOURS.get(name), linewidth=2.0)
+        axes.plot(places, median, "o", color=COLOURS.get(name), markersize=3.5, label=name)
+    axes.set_yscale("log")
+    common.plain_ticks(axes.yaxis)
+    axes.set_xticks(np.arange(len(results)))
+    axes.set_xticklabels([name.replace("_", "\n", 1) for name in results], rotation=20, fontsize=7)
+    axes.set_ylabel("position error [m], median to 95 %")
+    common.light_grid(axes)
+    common.legend_beside(axes)
+    common.save_figure(figure, path)
+
+
+def table(results, methods):
+    """Header and rows of the comparison."""
+    header = ["recording"] + [RAW_FIX] + list(methods)
+    rows = [[name] + [scores[method].cell() for method in header[1:]] for name, scores in results.items()]
+    return header, rows
+
+
+def markdown(header, rows):
+    """The table as Markdown."""
+    lines = ["| " + " | ".join(header) + " |", "|" + "---|" * len(header)]
+    return "\n".join(lines + ["| " + " | ".join(["`" + row[0] + "`"] + row[1:]) + " |" for row in rows])
+
+
+def replace_between(text, name, content, path):
+    """The text with what stands between the markers of `name` replaced."""
+    begin, end = "<!-- {} -->".format(name), "<!-- end of {} -->".format(name)
+    if text.count(begin) != 1 or text.count(end) != 1 or text.index(begin) > text.index(end):
+        raise common.ReportError("{}: needs the markers {} and {}, each once".format(path, begin, end))
+    head, rest = text.split(begin)
+    return head + begin + "\n" + content + "\n" + end + rest.split(end)[1]
+
+
+def write_docs(path, name, content):
+    """Renew one table of a Markdown file."""
+    try:
+        with open(path, encoding="utf-8") as stream:
+            text = replace_between(stream.read(), name, content, path)
+        with open(path, "w", encoding="utf-8") as stream:
+            stream.write(text)
+    except OSError as error:
+        raise common.ReportError("{}: {}".format(path, error.strerror))
+
+
+def ratios(results, method, reference):
+    """Geometric means over the recordings of median and 95 % of a method against another's."""
+    logs = [[math.log(scores[method].percentile(p) / scores[reference].percentile(p)) for p in (50, 95)]
+            for scores in results.values()]
+    return [math.exp(float(np.nanmean(column))) for column in zip(*logs)]
+
+
+def ablate(results):
+    """Header and rows of what each source of information is worth."""
+    header = ["without", "median", "95 %"] + list(results)
+    rows = []
+    for name in [ABLATED] + list(ABLATIONS):
+        change = ratios(results, name, ABLATED)
+        rows.append([name if name != ABLATED else "nothing"]
+                    + ["{:+.0f} %".format(100.0 * (ratio - 1.0)) for ratio in change]
+                    + [scores[name].cell() for scores in results.values()])
+    return header, rows
+
+
+def compare(options):
+    """Run everything; gives the path of the page."""
+    recordings = find_recordings(options.data, options.recordings)
+    methods = {name: METHODS[name] for name in options.methods or METHODS}
+    if options.ablation:
+        methods = {ABLATED: METHODS[ABLATED]}
+        methods.update({name: METHODS[ABLATED] + [part for text in changes for part in ("--set", text)]
+                        for name, changes in ABLATIONS.items()})
+    overrides = [part for text in options.overrides for part in ("--set", text)]
+    results, tracks = {}, {}
+    with concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
+        futures = {name: pool.submit(run_recording, options.data, options.output, name, methods, overrides)
+                   for name in recordings}
+        for done, (name, future) in enumerate(futures.items(), 1):
+            results[name], tracks[name] = future.result()
+            print("{}/{} {}".format(done, len(recordings), name), file=sys.stderr)
+    return write_report(options, methods, results, tracks)
+
+
+def write_report(options, methods, results, tracks):
+    """Figures, page and Markdown; gives the path of the page."""
+    title = "What each source of information is worth" if options.ablation else "Localizers on real recordings"
+    header, rows = ablate(results) if options.ablation else table(results, methods)
+    page = common.HtmlPage(title)
+    page.table(header, rows)
+    page.paragraph("Median / 95 % / maximum of the horizontal error in metres at the truth's stamps; † diverged: more "
+                   "than {:.0f} m for {:.0f} s on end.".format(DIVERGED_M, DIVERGED_S))
+    if not options.ablation:
+        plot_overview(os.path.join(options.output, "overview.png"), results, methods)
+        page.image("overview.png", "Median (dot) to 95 % of the position error.")
+    for name, scores in results.items():
+        picture = name + ".png"
+        plot_recording(os.path.join(options.output, picture), name, scores, tracks[name])
+        page.heading(name)
+        page.image(picture, "Black: truth; dots: raw fixes.")
+    page.heading("How this was made")
+    page.listing(" ".join(["compare_localizers.py"] + sys.argv[1:]))
+    page.save(os.path.join(options.output, "report.html"))
+    if options.docs:
+        write_docs(options.docs, "ablation" if options.ablation else "comparison", markdown(header, rows))
+        if not options.ablation:
+            plot_overview(os.path.join(os.path.dirname(options.docs) or ".", "real_data.png"), results, methods)
+    return os.path.join(options.output, "report.html")
+
+
+def main():
+    """Read the command line."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("output", help="folder for bags, runs, figures and the report")
+    parser.add_argument("--data", default=os.environ.get("URBAN_GNSS_DATA"), help="default: $URBAN_GNSS_DATA")
+    parser.add_argument("--docs", help="Markdown file whose tables are renewed, e.g. docs/real_data.md")
+    parser.add_argument("--recordings", nargs="+", default=[], help="default: all with truth")
+    parser.add_argument("--methods", nargs="+", choices=list(METHODS), help="default: all")
+    parser.add_argument("--ablation", action="store_true", help="the recommended localizer without each of its "
+                        "sources of information, instead of all localizers")
+    parser.add_argument("--set", action="append", default=[], dest="overrides", metavar="NAME=VALUE",
+                        help="a parameter for every run; repeatable")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="recordings at once")
+    try:
+        print(compare(parser.parse_args()))
+    except common.ReportError as error:
+        sys.exit("compare_localizers: {}".format(error))
+
+
+if __name__ == "__main__":
+    main()

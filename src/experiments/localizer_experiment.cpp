@@ -1,0 +1,175 @@
+#include "urban_gnss_localization/experiments/localizer_experiment.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "urban_gnss_localization/experiments/city_drive.hpp"
+#include "urban_gnss_localization/geometry/local_frame.hpp"
+
+namespace urban_gnss {
+namespace {
+
+/// A contender's localizer with its pipelines.
+class Participant : public DriveParticipant {
+ public:
+  Participant(const Contender& contender, const Scenario& scenario, const LocalizerExperimentConditions& conditions,
+              Trajectory& estimate)
+      : frame_(scenario.datum),
+        localization_(conditions.localization, contender.make()),
+        bias_tracker_(conditions.bias),
+        estimate_(estimate) {
+    const Eigen::Vector3d antenna = scenario.vehicle.antenna();
+    localization_.set_antenna_offset(antenna.head<2>());
+    localization_.set_datum(scenario.datum);
+    if (!contender.uses_occlusion) return;
+    occlusion_ = std::make_unique<OcclusionPipeline>(conditions.occlusion);
+    occlusion_->set_antenna(antenna);
+  }
+
+  bool wants_clouds() const override { return occlusion_ != nullptr; }
+
+  void add_imu_yaw_rate(Stamp stamp, double yaw_rate_radps) override {
+    localization_.add_imu_yaw_rate(stamp, yaw_rate_radps);
+  }
+
+  void add_odometry(const OdometrySample& sample) override {
+    localization_.add_odometry(sample);
+    settle();
+  }
+
+  void add_cloud(Stamp stamp, const PointCloud& cloud, const Eigen::Isometry3d& sensor_in_base,
+                 const Pose2& base_in_odom) override {
+    occlusion_->add_cloud(stamp, cloud, sensor_in_base, to_isometry(base_in_odom));
+  }
+
+  void add_epoch(const DriveEpoch& epoch, const Pose2& base_in_odom) override {
+    if (occlusion_) occlusion_->set_satellites(epoch.stamp, epoch.satellites, epoch.angle_resolution_rad);
+    if (!epoch.fix) return;
+    RawFix fix;
+    fix.stamp = epoch.stamp;
+    fix.position = frame_.to_geodetic(epoch.fix->position);
+    fix.covariance = epoch.fix->covariance;
+    fix.covariance_type = CovarianceType::kApproximated;
+    if (occlusion_) {
+      const Eigen::Matrix2d claimed = fix.covariance.topLeftCorner<2, 2>();
+      fix.covariance.topLeftCorner<2, 2>() =
+          occlusion_->assess(epoch.stamp, claimed, to_isometry(base_in_odom)).covariance.weighted;
+      fix.covariance_type = CovarianceType::kKnown;
+    }
+    localization_.add_fix(fix);
+    settle();
+  }
+
+ private:
+  void settle() {
+    if (localization_.epoch() != epoch_) {
+      epoch_ = localization_.epoch();
+      bias_tracker_.reset();
+    }
+    while (const auto query = localization_.bias_query()) {
+      localization_.add_bias(bias_tracker_.process(query->fix, query->predicted_antenna_position, query->sanitation));
+    }
+    for (const LocalizationOutput& output : localization_.take_outputs()) {
+      estimate_.push_back({output.stamp, output.estimate.pose, output.estimate.covariance});
+      if (!occlusion_) continue;
+      occlusion_->set_alignment(
+          {output.stamp, map_to_odometry(output), std::sqrt(std::max(0.0, output.estimate.covariance(2, 2)))});
+    }
+    localization_.take_events();
+    localization_.take_verdicts();
+  }
+
+  LocalFrame frame_;
+  LocalizationPipeline localization_;
+  BiasTracker bias_tracker_;
+  std::size_t epoch_{0};
+  std::unique_ptr<OcclusionPipeline> occlusion_;
+  Trajectory& estimate_;
+};
+
+/// Looks for times without fixes.
+class OutageWatch : public DriveParticipant {
+ public:
+  explicit OutageWatch(std::vector<FixOutage>& outages) : outages_(outages) {}
+
+  bool wants_clouds() const override { return false; }
+  void add_odometry(const OdometrySample&) override {}
+  void add_cloud(Stamp, const PointCloud&, const Eigen::Isometry3d&, const Pose2&) override {}
+  void add_epoch(const DriveEpoch& epoch, const Pose2&) override {
+    if (!epoch.fix) return;
+    if (last_fix_ && to_seconds(epoch.stamp - *last_fix_) > kOutage_s) since_ = last_fix_;
+    last_fix_ = epoch.stamp;
+    if (!since_ || epoch.error_m.norm() > kGoodFix_m) return;
+    outages_.push_back({*since_, epoch.stamp});
+    since_.reset();
+  }
+
+ private:
+  std::vector<FixOutage>& outages_;
+  std::optional<Stamp> last_fix_;
+  std::optional<Stamp> since_;  ///< of an outage after which no good fix came yet
+};
+
+/// s for which an error beyond kGoodFix_m remained after `good_fix`.
+double reacquisition_s(const std::vector<ErrorSample>& samples, Stamp good_fix) {
+  double last_bad_s = 0.0;
+  double seen_s = 0.0;
+  for (const ErrorSample& sample : samples) {
+    const double after_s = to_seconds(sample.stamp - good_fix);
+    if (after_s < 0.0 || after_s > kReacquisitionWindow_s) continue;
+    seen_s = after_s;
+    if (sample.position_error_m > kGoodFix_m) last_bad_s = after_s;
+  }
+  return last_bad_s < seen_s ? last_bad_s : std::numeric_limits<double>::infinity();
+}
+
+}  // namespace
+
+LocalizerRun run_localizer_experiment(const Scenario& scenario, const std::vector<Contender>& contenders,
+                                      const LocalizerExperimentConditions& conditions,
+                                      const std::function<void(double)>& on_progress) {
+  LocalizerRun run;
+  run.estimates.resize(contenders.size());
+  std::vector<std::unique_ptr<DriveParticipant>> participants;
+  for (std::size_t i = 0; i < contenders.size(); ++i) {
+    participants.push_back(std::make_unique<Participant>(contenders[i], scenario, conditions, run.estimates[i]));
+  }
+  participants.push_back(std::make_unique<OutageWatch>(run.outages));
+  std::vector<DriveParticipant*> all;
+  for (const auto& each : participants) all.push_back(each.get());
+  run.truth = drive_city(scenario, conditions.cloud_every, all, on_progress).truth;
+  return run;
+}
+
+ContenderSummary summarize_contender(const std::vector<LocalizerRun>& runs, std::size_t contender) {
+  ContenderSummary summary;
+  std::vector<double> position;
+  std::vector<double> heading;
+  double nees_sum = 0.0;
+  double nees_count = 0.0;
+  double truths = 0.0;
+  for (const LocalizerRun& run : runs) {
+    const TrajectoryErrors errors = errors_at_truth(run.truth, run.estimates[contender]);
+    truths += static_cast<double>(run.truth.size());
+    for (const ErrorSample& sample : errors.samples) {
+      position.push_back(sample.position_error_m);
+      heading.push_back(sample.heading_error_rad);
+      if (std::isnan(sample.nees)) continue;
+      nees_sum += sample.nees;
+      nees_count += 1.0;
+    }
+    summary.rmse_m.push_back(errors.summary.position_m.rmse);
+    if (errors.summary.position_m.max > kDiverged_m) ++summary.diverged;
+    for (const FixOutage& outage : run.outages) {
+      summary.reacquisition_s = std::fmax(summary.reacquisition_s, reacquisition_s(errors.samples, outage.good_fix));
+    }
+  }
+  if (nees_count > 0.0) summary.nees_mean = nees_sum / nees_count;
+  if (truths > 0.0) summary.coverage = static_cast<double>(position.size()) / truths;
+  summary.heading_rmse_rad = summarize(std::move(heading)).rmse;
+  summary.position_m = summarize(std::move(position));
+  return summary;
+}
+
+}  // namespace urban_gnss

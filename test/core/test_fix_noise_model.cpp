@@ -1,0 +1,79 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "matchers.hpp"
+#include "urban_gnss_localization/common/random.hpp"
+#include "urban_gnss_localization/filters/fix_noise_model.hpp"
+#include "urban_gnss_localization/gnss/chi_squared.hpp"
+
+namespace urban_gnss {
+namespace {
+
+FixNoiseModelParameters make(const std::string& changes = "{}") { return with(FixNoiseModelParameters{}, changes); }
+
+/// Where the factor settles for fixes whose errors are `sigma` times the declared, a share of them outliers.
+double settled_scale(double sigma, double outlier_share, const FixNoiseModelParameters& parameters) {
+  FixNoiseModel model(parameters);
+  RandomEngine engine = make_engine(3);
+  double log_sum = 0.0;
+  constexpr int kCount = 20000;
+  for (int k = 0; k < kCount; ++k) {
+    double x = sigma * draw_normal(engine);
+    if (draw_uniform(engine) < outlier_share) x += 1e6;
+    const double y = sigma * draw_normal(engine);
+    model.learn(k, (x * x + y * y) / model.scale() > FixNoiseModel::kMedianNis ? 1.0 : 0.0);
+    if (k >= kCount / 2) log_sum += std::log(model.scale());
+  }
+  return std::exp(log_sum / (kCount / 2));
+}
+
+TEST(FixNoiseModel, MedianIsThatOfTheChiSquaredDistribution) {
+  EXPECT_NEAR(FixNoiseModel::kMedianNis, chi_squared_quantile(0.5, 2), 1e-9);
+}
+
+TEST(FixNoiseModel, LearnsTheReceiversFactorWhateverTheOutliers) {
+  const FixNoiseModelParameters parameters = make("fix_scale_rate: 0.01");
+  for (const double sigma : {0.2, 1.0, 5.0}) {
+    EXPECT_NEAR(settled_scale(sigma, 0.0, parameters) / (sigma * sigma), 1.0, 0.05) << sigma;
+    // With a fifth of outliers, half of all is 0.625 of the others: their quantile, 1.96, over the median.
+    EXPECT_NEAR(settled_scale(sigma, 0.2, parameters) / (sigma * sigma), 1.96 / 1.386, 0.08) << sigma;
+  }
+}
+
+TEST(FixNoiseModel, StaysWithinItsLimit) {
+  EXPECT_NEAR(settled_scale(100.0, 0.0, make("fix_scale_limit: 3.0")), 9.0, 1e-9);
+  EXPECT_NEAR(settled_scale(0.01, 0.0, make("fix_scale_limit: 3.0")), 1.0 / 9.0, 0.02);
+  EXPECT_EQ(settled_scale(100.0, 0.0, make("fix_scale_rate: 0.0")), 1.0);
+}
+
+TEST(FixNoiseModel, CorrelatedFixesAreWorthLess) {
+  FixNoiseModel model(make("{fix_correlation_time: 2.0, parked_correlation_time: 30.0}"));
+  EXPECT_EQ(model.correlation_inflation(0.0), 1.0);  // nothing to be correlated with
+  model.learn(0.0, 0.5);
+  model.move({5.0, 0.0}, 1.0);
+  const double a = std::exp(-0.5);
+  EXPECT_NEAR(model.correlation_inflation(1.0), (1.0 + a) / (1.0 - a), 1e-9);
+  EXPECT_NEAR(model.correlation_inflation(1000.0), 1.0, 1e-9);
+  EXPECT_TRUE(std::isfinite(model.correlation_inflation(0.0)));
+  EXPECT_GT(model.correlation_inflation(0.0), 1e3);  // the same instant says nothing new
+  EXPECT_TRUE(std::isfinite(model.correlation_inflation(-5.0)));
+  model.learn(1.0, 0.5);
+  model.move({0.0, 0.0}, 1.0);
+  const double b = std::exp(-1.0 / 30.0);
+  EXPECT_NEAR(model.correlation_inflation(2.0), (1.0 + b) / (1.0 - b), 1e-6);
+  model.restart();
+  EXPECT_EQ(model.correlation_inflation(2.0), 1.0);
+}
+
+TEST(FixNoiseModel, ARestartKeepsWhatIsKnownOfTheReceiver) {
+  FixNoiseModel model(make());
+  for (int k = 0; k < 50; ++k) model.learn(k, 1.0);
+  const double scale = model.scale();
+  EXPECT_GT(scale, 2.0);
+  model.restart();
+  EXPECT_EQ(model.scale(), scale);
+}
+
+}  // namespace
+}  // namespace urban_gnss
