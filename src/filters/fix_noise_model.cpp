@@ -12,7 +12,8 @@ constexpr double kMostInflation = 1e6;
 
 }  // namespace
 
-void FixNoiseModel::restart() {
+void FixNoiseModel::reset() {
+  scale_ = 1.0;
   last_s_.reset();
   moved_m_ = 0.0;
   elapsed_s_ = 0.0;

@@ -64,7 +64,7 @@ void ImmEkf::initialize(const PoseEstimate& start) {
   filters_.fill(first);
   probability_ << 1.0, 0.0, 0.0;
   bias_odds_ = 1.0;
-  noise_.restart();
+  noise_.reset();
   last_fix_s_.reset();
   moved_s_ = 0.0;
 }

@@ -105,7 +105,7 @@ void SwitchingParticleFilter::initialize(const PoseEstimate& start) {
   mean_errors_ = {};
   estimate_ = start.pose;
   bias_odds_ = 1.0;
-  noise_.restart();
+  noise_.reset();
   last_fix_s_.reset();
   moved_s_ = 0.0;
   clusters_.find(particles_);

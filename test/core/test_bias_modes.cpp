@@ -125,6 +125,7 @@ TEST(BiasModes, BiasOfEachContinuation) {
   p.fast_bias_walk = 3.0;
   p.jump_sigma = 20.0;
   p.onset_sigma = 0.25;
+  p.bias_fade_time = 0.0;
   const BiasState bias{{4.0, -1.0}, 0.5};
   for (const BiasMode from : {S, L, F}) {
     const BiasState direct = predict_bias(bias, from, S, 2.0, p);
@@ -144,6 +145,24 @@ TEST(BiasModes, BiasOfEachContinuation) {
   EXPECT_EQ(predict_bias(bias, S, L, 2.0, p).variance, 0.0625 + 0.25 * 2.0);
   EXPECT_EQ(lasting(J), L);
   EXPECT_EQ(lasting(F), F);
+}
+
+TEST(BiasModes, ABiasThatFadesEndsAsOneThatHasJustCome) {
+  BiasModeParameters p;
+  p.bias_fade_time = 10.0;
+  p.jump_sigma = 8.0;
+  p.slow_bias_walk = 0.0;
+  const BiasState bias{{4.0, -1.0}, 0.5};
+  const BiasState later = predict_bias(bias, L, L, 10.0, p);
+  EXPECT_NEAR(later.mean.x(), 4.0 * std::exp(-1.0), 1e-12);
+  EXPECT_NEAR(later.variance, std::exp(-2.0) * 0.5 + (1.0 - std::exp(-2.0)) * 64.0, 1e-12);
+  // Two steps are as good as one.
+  const BiasState half = predict_bias(predict_bias(bias, L, L, 4.0, p), L, L, 6.0, p);
+  EXPECT_LT((half.mean - later.mean).norm(), 1e-12);
+  EXPECT_NEAR(half.variance, later.variance, 1e-12);
+  const BiasState end = predict_bias(bias, L, L, 1000.0, p);
+  EXPECT_LT(end.mean.norm(), 1e-12);
+  EXPECT_NEAR(end.variance, predict_bias(bias, L, J, 1.0, p).variance, 1e-9);
 }
 
 TEST(BiasModes, NoiseOfAFixWithAndWithoutBias) {

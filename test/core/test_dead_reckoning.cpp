@@ -87,6 +87,8 @@ TEST(DeadReckoning, LinearisesTheMotionModel) {
     motion.wheelbase = 1.3;
     OdometryErrorParameters parameters;
     parameters.motion_noise_factor = 0.5;
+    parameters.position_walk = 0.0;
+    parameters.heading_walk = 0.0;
     const MotionStep moved = make_motion_step({2.0, 0.4}, 0.1, motion, parameters);
     const Pose2 start{3.0, -2.0, 2.9};
     const OdometryErrors errors{0.04, -0.02};

@@ -42,7 +42,7 @@ TEST(FixNoiseModel, LearnsTheReceiversFactorWhateverTheOutliers) {
 }
 
 TEST(FixNoiseModel, StaysWithinItsLimit) {
-  EXPECT_NEAR(settled_scale(100.0, 0.0, make("fix_scale_limit: 3.0")), 9.0, 1e-9);
+  EXPECT_NEAR(settled_scale(100.0, 0.0, make("fix_scale_limit: 3.0")), 9.0, 1e-3);
   EXPECT_NEAR(settled_scale(0.01, 0.0, make("fix_scale_limit: 3.0")), 1.0 / 9.0, 0.02);
   EXPECT_EQ(settled_scale(100.0, 0.0, make("fix_scale_rate: 0.0")), 1.0);
 }
@@ -62,17 +62,16 @@ TEST(FixNoiseModel, CorrelatedFixesAreWorthLess) {
   model.move({0.0, 0.0}, 1.0);
   const double b = std::exp(-1.0 / 30.0);
   EXPECT_NEAR(model.correlation_inflation(2.0), (1.0 + b) / (1.0 - b), 1e-6);
-  model.restart();
+  model.reset();
   EXPECT_EQ(model.correlation_inflation(2.0), 1.0);
 }
 
-TEST(FixNoiseModel, ARestartKeepsWhatIsKnownOfTheReceiver) {
+TEST(FixNoiseModel, AResetForgetsTheFactorF26) {
   FixNoiseModel model(make());
   for (int k = 0; k < 50; ++k) model.learn(k, 1.0);
-  const double scale = model.scale();
-  EXPECT_GT(scale, 2.0);
-  model.restart();
-  EXPECT_EQ(model.scale(), scale);
+  EXPECT_GT(model.scale(), 2.0);
+  model.reset();
+  EXPECT_EQ(model.scale(), 1.0);
 }
 
 }  // namespace

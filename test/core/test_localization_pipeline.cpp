@@ -1,4 +1,6 @@
 #include "pipeline_rig.hpp"
+#include "urban_gnss_localization/filters/imm_ekf.hpp"
+#include "urban_gnss_localization/filters/switching_particle_filter.hpp"
 
 namespace urban_gnss {
 namespace {
@@ -220,12 +222,15 @@ TEST(LocalizationPipeline, StampsAscendAcrossAResetThatIsAskedForF22) {
 }
 
 TEST(LocalizationPipeline, ClockSetBackGivesTheSameRunAgainF21) {
-  for (const bool with_datum : {false, true}) {
+  for (const auto& [with_datum, mode] : {std::pair{false, ParticleFilterMode::kPaper},
+                                         {true, ParticleFilterMode::kPaper},
+                                         {true, ParticleFilterMode::kSwitching}}) {
     LocalizationParameters parameters;
     if (with_datum) parameters.datum.datum = {33.0, 130.0, 20.0};
     ParticleFilterParameters filter;
+    filter.mode = mode;
     filter.particle_count = 100;
-    Rig rig(parameters, std::make_unique<ParticleFilter>(filter, MotionParameters{}));
+    Rig rig(parameters, make_particle_filter(filter, MotionParameters{}));
     std::vector<LocalizationOutput> passes[2];
     for (auto& pass : passes) {
       rig.run(0.0, 60.0);
@@ -245,12 +250,13 @@ TEST(LocalizationPipeline, ClockSetBackGivesTheSameRunAgainF21) {
 TEST(LocalizationPipeline, TracksWithTheParticleFilter) {
   LocalizationParameters parameters;
   parameters.datum.datum = {33.0, 130.0, 20.0};
-  for (const auto mode : {ParticleFilterMode::kConventional, ParticleFilterMode::kPaper}) {
+  for (const auto mode :
+       {ParticleFilterMode::kConventional, ParticleFilterMode::kPaper, ParticleFilterMode::kSwitching}) {
     ParticleFilterParameters filter;
     filter.mode = mode;
     filter.likelihood = LikelihoodChoice::kProduct;
     filter.particle_count = 500;
-    Rig rig(parameters, std::make_unique<ParticleFilter>(filter, MotionParameters{}));
+    Rig rig(parameters, make_particle_filter(filter, MotionParameters{}));
     rig.run(0.0, 120.0);
     const auto outputs = rig.pipeline.take_outputs();
     ASSERT_FALSE(outputs.empty());
@@ -259,6 +265,18 @@ TEST(LocalizationPipeline, TracksWithTheParticleFilter) {
     EXPECT_LT(std::abs(angle_difference(outputs.back().estimate.pose.yaw, Rig::truth(120.0).yaw)), 0.3);
     EXPECT_EQ(rig.state(), LocalizationState::kTracking);
   }
+}
+
+TEST(LocalizationPipeline, TracksWithTheInteractingModels) {
+  LocalizationParameters parameters;
+  parameters.datum.datum = {33.0, 130.0, 20.0};
+  Rig rig(parameters, std::make_unique<ImmEkf>(ImmEkfParameters{}, MotionParameters{}));
+  rig.run(0.0, 120.0);
+  const auto outputs = rig.pipeline.take_outputs();
+  ASSERT_FALSE(outputs.empty());
+  EXPECT_LT((outputs.back().estimate.pose.position() - Rig::truth(120.0).position()).norm(), 2.0);
+  EXPECT_LT(std::abs(angle_difference(outputs.back().estimate.pose.yaw, Rig::truth(120.0).yaw)), 0.3);
+  EXPECT_EQ(rig.state(), LocalizationState::kTracking);
 }
 
 TEST(LocalizationPipeline, ImuYawRateReplacesTheOdometrys) {

@@ -68,6 +68,7 @@ TEST(SwitchingParticleFilter, ArraysAgreeWithThePlainForm) {
 TEST(SwitchingParticleFilter, LikelihoodIsTheIntegralOverTheBias) {
   BiasModeParameters p;
   p.outlier_share = 0.0;
+  p.student_dof = 1e9;
   const BiasState bias{{4.0, -2.0}, 1.5};
   const SwitchingFix fix{{5.0, 0.5}, {0.0, 0.0}, 4.0, 9.0, 2.0};
   const ModeTransition t = mode_transition(fix.elapsed_s, p);
@@ -124,7 +125,7 @@ TEST(SwitchingParticleFilter, AgreesWithTheInteractingModels) {
     d.seed = seed;
     d.bias = bias_between(40.0, 80.0, {6.0, 12.0});
     SwitchingParticleFilter particles = make();
-    ImmEkf imm(ImmEkfParameters{}, {});
+    ImmEkf imm(with(ImmEkfParameters{}, kTextbookNoise), {});
     const auto a = drive(particles, d);
     const auto b = drive(imm, d);
     double squares = 0.0;

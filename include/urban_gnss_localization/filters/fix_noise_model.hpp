@@ -41,8 +41,8 @@ class FixNoiseModel {
   /// Requires parameters without faults.
   explicit FixNoiseModel(const FixNoiseModelParameters& parameters) : parameters_(parameters) {}
 
-  /// Forgets the fixes, not the receiver: the factor is kept.
-  void restart();
+  /// Forgets everything, the factor too: a filter that starts anew gives the same again.
+  void reset();
   /// Odometry since the last fix: whether the robot stands.
   void move(const Twist2& twist, double duration_s);
 
