@@ -108,8 +108,9 @@ TEST(ParticleFilter, EveryParameterHasAnEffectF36) {
       {"seed: 2", "{}"},
   };
   // Those of the mode switching have a test of their own.
-  const std::size_t others =
-      parameter_names(BiasModeParameters{}).size() + parameter_names(OdometryErrorParameters{}).size();
+  const std::size_t others = parameter_names(BiasModeParameters{}).size() +
+                             parameter_names(OdometryErrorParameters{}).size() +
+                             parameter_names(FixNoiseModelParameters{}).size();
   EXPECT_EQ(changes.size() + others, parameter_names(ParticleFilterParameters{}).size());
   for (const auto& [change, base] : changes) {
     EXPECT_FALSE(drive(with(small(base), change)) == drive(small(base))) << change;
