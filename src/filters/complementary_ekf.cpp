@@ -47,14 +47,17 @@ void ComplementaryEkf::initialize(const PoseEstimate& start) {
   pose_ = start.pose;
   dead_reckoned_ = start.pose;
   errors_ = {};
-  filter_.set_state(ErrorState::Zero(), initial_error_covariance(start.covariance, parameters_.odometry));
+  Filter::StateCovariance covariance = Filter::StateCovariance::Zero();
+  covariance.topLeftCorner<kErrorStates, kErrorStates>() =
+      initial_error_covariance(start.covariance, parameters_.odometry);
+  filter_.set_state(Filter::State::Zero(), covariance);
+  colour_.setZero();
   detector_.reset();
   noise_monitor_.reset();
   path_.setZero();
   path_variance_m2_ = 0.0;
   is_open_ = false;
   had_fix_ = false;
-  insignificant_ = 0;
   is_inert_ = false;
   run_.reset();
   heading_search_.reset();
@@ -64,25 +67,83 @@ void ComplementaryEkf::initialize(const PoseEstimate& start) {
   elapsed_since_fix_s_ = 0.0;
   last_test_covariance_.setZero();
   bias_estimates_.clear();
+  memory_.clear();
 }
 
-void ComplementaryEkf::move(const Twist2& twist, double duration_s) {
+DeadReckoningStep ComplementaryEkf::step(const Twist2& twist, double duration_s) {
   DeadReckoningStep step = dead_reckon(pose_, errors_, twist, duration_s, parameters_.odometry);
   const double distance = std::abs(twist.speed_mps) * duration_s;
   if (heading_search_) {
     // Which way it went is unknown: the position stays and becomes uncertain by the distance.
     step.noise.topLeftCorner<2, 2>().diagonal().array() += distance * (distance + 2.0 * moved_since_fix_m_);
-    step.transition.topRows<2>().rightCols<3>().setZero();
+    step.transition.topRightCorner<2, kErrorStates - 2>().setZero();
     step.pose.x = pose_.x;
     step.pose.y = pose_.y;
   }
   moved_since_fix_m_ += distance;
   elapsed_since_fix_s_ += duration_s;
-  filter_.predict(step.transition * filter_.bias_free_state(), step.transition, step.noise);
-  path_ += step.pose.position() - pose_.position();
-  path_variance_m2_ += 0.5 * step.noise.topLeftCorner<2, 2>().trace();
+  Filter::StateCovariance transition = Filter::StateCovariance::Identity();
+  Filter::StateCovariance noise = Filter::StateCovariance::Zero();
+  transition.topLeftCorner<kErrorStates, kErrorStates>() = step.transition;
+  noise.topLeftCorner<kErrorStates, kErrorStates>() = step.noise;
+  filter_.predict(transition * filter_.bias_free_state(), transition, noise);
   pose_ = step.pose;
+  return step;
+}
+
+void ComplementaryEkf::move(const Twist2& twist, double duration_s) {
+  const Eigen::Vector2d from = pose_.position();
+  const DeadReckoningStep moved = step(twist, duration_s);
+  path_ += pose_.position() - from;
+  path_variance_m2_ += 0.5 * moved.noise.topLeftCorner<2, 2>().trace();
   dead_reckoned_ = urban_gnss::move(dead_reckoned_, twist, duration_s);
+  if (!memory_.empty()) memory_.back().steps.push_back({twist, duration_s});
+}
+
+ComplementaryEkf::Snapshot ComplementaryEkf::snapshot() const {
+  return {pose_, errors_, filter_, colour_, moved_since_fix_m_, elapsed_since_fix_s_, last_fix_s_, had_fix_};
+}
+
+void ComplementaryEkf::restore(const Snapshot& from) {
+  pose_ = from.pose;
+  errors_ = from.errors;
+  filter_ = from.filter;
+  colour_ = from.colour;
+  moved_since_fix_m_ = from.moved_since_fix_m;
+  elapsed_since_fix_s_ = from.elapsed_since_fix_s;
+  last_fix_s_ = from.last_fix_s;
+  had_fix_ = from.had_fix;
+}
+
+void ComplementaryEkf::remember(const FixMeasurement& fix) {
+  if (is_open_ || heading_search_ || parameters_.mode != ComplementaryMode::kCompensated) {
+    memory_.clear();
+    return;
+  }
+  while (memory_.size() > 1 && fix.time_s - memory_[1].fix.time_s > parameters_.bias_onset_time) memory_.pop_front();
+  memory_.push_back({fix, snapshot(), {}});
+}
+
+bool ComplementaryEkf::open_at_onset(double now_s, const Eigen::Matrix2d& m0) {
+  while (memory_.size() > 1 && now_s - memory_.front().fix.time_s > parameters_.bias_onset_time) memory_.pop_front();
+  if (is_open_ || memory_.empty()) {
+    filter_.open_bias(m0);
+    return false;
+  }
+  restore(memory_.front().after);
+  filter_.open_bias(m0);
+  for (std::size_t i = 0; i < memory_.size(); ++i) {
+    for (const Step& each : memory_[i].steps) step(each.twist, each.duration_s);
+    if (i + 1 == memory_.size()) break;
+    const FixMeasurement& fix = memory_[i + 1].fix;
+    move_bias(fix.time_s);
+    apply(innovate(fix));
+    last_fix_s_ = fix.time_s;
+    moved_since_fix_m_ = 0.0;
+    elapsed_since_fix_s_ = 0.0;
+  }
+  memory_.clear();
+  return true;
 }
 
 void ComplementaryEkf::set_mode(ComplementaryMode mode) {
@@ -90,28 +151,40 @@ void ComplementaryEkf::set_mode(ComplementaryMode mode) {
   parameters_.mode = mode;
 }
 
-FixVerdict ComplementaryEkf::correct(const FixMeasurement& fix) {
+FixNoise ComplementaryEkf::noise_of_fix() const {
+  return parameters_.mode == ComplementaryMode::kCompensated ? noise_monitor_.noise() : FixNoise{};
+}
+
+ComplementaryEkf::Innovation ComplementaryEkf::innovate(const FixMeasurement& fix) {
+  const FixNoise noise = noise_of_fix();
+  move_colour(fix, noise);
   const Eigen::Vector2d predicted = transform_point(pose_, fix.antenna_in_body);
   const Eigen::Vector2d lever = predicted - pose_.position();
-  noise_monitor_.add(fix.position, fix.covariance, path_ + lever, path_variance_m2_,
-                     std::sqrt(filter_.compensated_covariance().diagonal().segment<2>(2).sum()), fix.time_s);
-
   Innovation innovation;
-  innovation.value = fix.position - predicted;
+  innovation.value = fix.position - predicted - colour_;
   innovation.observation.setZero();
   innovation.observation.leftCols<2>().setIdentity();
   innovation.observation.col(2) << -lever.y(), lever.x();
-  innovation.declared = fix.covariance;
-  innovation.noise = noise_inflation() * fix.covariance;
+  innovation.observation.rightCols<2>().setIdentity();
+  innovation.white = noise.white * fix.covariance;
   innovation.time_s = fix.time_s;
+  return innovation;
+}
 
-  if (is_open_) {
-    const double elapsed_s = std::max(0.0, fix.time_s - last_fix_s_);
-    const double share = std::exp(-elapsed_s / parameters_.fix_bias_time);
-    const double grown = parameters_.fix_bias_sigma * parameters_.fix_bias_sigma * (1.0 - share * share);
-    filter_.fade_bias(share);
-    filter_.grow_bias(grown * Eigen::Matrix2d::Identity());
-  }
+void ComplementaryEkf::move_bias(double time_s) {
+  const double elapsed_s = std::max(0.0, time_s - last_fix_s_);
+  const double share = std::exp(-elapsed_s / parameters_.fix_bias_time);
+  const double grown = parameters_.fix_bias_sigma * parameters_.fix_bias_sigma * (1.0 - share * share);
+  filter_.fade_bias(share);
+  filter_.grow_bias(grown * Eigen::Matrix2d::Identity());
+}
+
+FixVerdict ComplementaryEkf::correct(const FixMeasurement& fix) {
+  const Eigen::Vector2d predicted = transform_point(pose_, fix.antenna_in_body);
+  noise_monitor_.add(fix.position, fix.covariance, path_ + predicted - pose_.position(), path_variance_m2_,
+                     std::sqrt(filter_.compensated_covariance().diagonal().segment<2>(2).sum()), fix.time_s, !run_);
+  if (is_open_) move_bias(fix.time_s);
+  const Innovation innovation = innovate(fix);
   if (run_ && fix.time_s - run_->last_s > parameters_.lockout_gap) run_.reset();
 
   FixVerdict verdict;
@@ -120,22 +193,27 @@ FixVerdict ComplementaryEkf::correct(const FixMeasurement& fix) {
     verdict.reason =
         search_heading(fix, innovation) ? "heading found from fixes and motion" : "used to find the heading";
   } else {
-    decide(innovation, verdict);
+    decide(fix, innovation, verdict);
   }
   last_fix_s_ = fix.time_s;
   had_fix_ = true;
   moved_since_fix_m_ = 0.0;
   elapsed_since_fix_s_ = 0.0;
+  remember(fix);
   publish(fix, predicted, verdict);
   return verdict;
 }
 
-double ComplementaryEkf::noise_inflation() const {
-  const double inflation = noise_monitor_.inflation();
+void ComplementaryEkf::move_colour(const FixMeasurement& fix, const FixNoise& noise) {
   const bool is_parked = elapsed_since_fix_s_ > 0.0 && moved_since_fix_m_ < kParked_mps * elapsed_since_fix_s_;
-  if (!is_parked) return inflation;
-  // The mean of errors of correlation time tau over a time T has the variance 2 tau / T of one of them.
-  return std::max(inflation, 2.0 * parameters_.parked_correlation_time / elapsed_since_fix_s_);
+  const double time_s = is_parked ? parameters_.parked_correlation_time : parameters_.fix_correlation_time;
+  const double share = had_fix_ ? std::exp(-std::max(0.0, fix.time_s - last_fix_s_) / time_s) : 0.0;
+  Filter::StateCovariance transition = Filter::StateCovariance::Identity();
+  transition.bottomRightCorner<2, 2>() *= share;
+  Filter::StateCovariance q = Filter::StateCovariance::Zero();
+  q.bottomRightCorner<2, 2>() = (1.0 - share * share) * noise.coloured * fix.covariance;
+  filter_.predict(transition * filter_.bias_free_state(), transition, q);
+  colour_ *= share;
 }
 
 bool ComplementaryEkf::search_heading(const FixMeasurement& fix, const Innovation& innovation) {
@@ -155,14 +233,14 @@ bool ComplementaryEkf::search_heading(const FixMeasurement& fix, const Innovatio
   return true;
 }
 
-void ComplementaryEkf::decide(const Innovation& innovation, FixVerdict& verdict) {
-  const Eigen::Matrix2d covariance = prediction_covariance(innovation) + innovation.declared;
+void ComplementaryEkf::decide(const FixMeasurement& fix, const Innovation& innovation, FixVerdict& verdict) {
+  const Eigen::Matrix2d covariance = prediction_covariance(innovation) + innovation.white;
   last_test_covariance_ = covariance;
   verdict.nis_dof = kFixDof;
   verdict.nis_threshold = detector_.threshold();
   verdict.decision = FixDecision::kAccepted;
   if (is_open_) {
-    decide_open(innovation, verdict);
+    decide_open(fix, innovation, verdict);
     return;
   }
   const BiasDetection detection = detector_.test(innovation.value, covariance);
@@ -178,35 +256,40 @@ void ComplementaryEkf::decide(const Innovation& innovation, FixVerdict& verdict)
   if (parameters_.mode == ComplementaryMode::kGated) {
     reject(innovation, verdict);
   } else {
-    open_or_reject(innovation, verdict);
+    open_or_reject(fix, innovation, verdict);
   }
 }
 
-void ComplementaryEkf::open_or_reject(const Innovation& innovation, FixVerdict& verdict) {
+void ComplementaryEkf::open_or_reject(const FixMeasurement& fix, const Innovation& innovation, FixVerdict& verdict) {
   const Eigen::Matrix2d m0 = parameters_.fix_bias_sigma * parameters_.fix_bias_sigma * Eigen::Matrix2d::Identity();
-  const Eigen::Matrix2d covariance = prediction_covariance(innovation) + innovation.declared + m0;
+  const Eigen::Matrix2d covariance = prediction_covariance(innovation) + innovation.white + m0;
   if (normalised_innovation_squared(innovation.value, covariance) > detector_.threshold()) {
     verdict.reason = "farther away than a bias explains";
     reject(innovation, verdict);
     return;
   }
-  filter_.open_bias(m0);
+  const bool has_gone_back = open_at_onset(innovation.time_s, m0);
   if (!is_open_) opened_s_ = innovation.time_s;
   is_open_ = true;
+  significant_s_ = innovation.time_s;
   is_confirmed_ = false;
   opening_nis_ = normalised_innovation_squared(innovation.value, covariance - m0);
-  insignificant_ = 0;
   doubt(innovation);
-  apply(innovation);
+  if (has_gone_back) {
+    move_bias(fix.time_s);
+    apply(innovate(fix));
+  } else {
+    apply(innovation);
+  }
   verdict.decision = FixDecision::kBiasCompensated;
 }
 
-void ComplementaryEkf::decide_open(const Innovation& innovation, FixVerdict& verdict) {
+void ComplementaryEkf::decide_open(const FixMeasurement& fix, const Innovation& innovation, FixVerdict& verdict) {
   const Eigen::Vector2d compensated = innovation.value - filter_.bias();
   verdict.nis = normalised_innovation_squared(
-      compensated, filter_.innovation_covariance(innovation.observation, kBiasObservation, innovation.declared));
+      compensated, filter_.innovation_covariance(innovation.observation, kBiasObservation, innovation.white));
   const double direct =
-      normalised_innovation_squared(innovation.value, prediction_covariance(innovation) + innovation.declared);
+      normalised_innovation_squared(innovation.value, prediction_covariance(innovation) + innovation.white);
   if (!is_confirmed_ && is_false_alarm(innovation, direct, verdict)) return;
   if (verdict.nis <= detector_.threshold()) {
     is_confirmed_ = true;
@@ -224,13 +307,13 @@ void ComplementaryEkf::decide_open(const Innovation& innovation, FixVerdict& ver
     apply(innovation);
     return;
   }
-  open_or_reject(innovation, verdict);
+  open_or_reject(fix, innovation, verdict);
 }
 
 bool ComplementaryEkf::is_false_alarm(const Innovation& innovation, double direct_nis, FixVerdict& verdict) {
-  const Eigen::Matrix2d without = prediction_covariance(innovation) + innovation.declared;
+  const Eigen::Matrix2d without = prediction_covariance(innovation) + innovation.white;
   const Eigen::Matrix2d with =
-      filter_.innovation_covariance(innovation.observation, kBiasObservation, innovation.declared);
+      filter_.innovation_covariance(innovation.observation, kBiasObservation, innovation.white);
   // Likelihood of the fix without a bias against that with the bias that the last fix showed.
   const bool speaks_for_none = direct_nis <= detector_.threshold() && direct_nis + std::log(without.determinant()) <
                                                                           verdict.nis + std::log(with.determinant());
@@ -251,8 +334,8 @@ bool ComplementaryEkf::is_false_alarm(const Innovation& innovation, double direc
 }
 
 void ComplementaryEkf::close_if_insignificant(const Innovation& innovation, FixVerdict& verdict) {
-  insignificant_ = bias_statistic() <= close_threshold_ ? insignificant_ + 1 : 0;
-  if (insignificant_ >= parameters_.close_count) {
+  if (bias_statistic() > close_threshold_) significant_s_ = innovation.time_s;
+  if (innovation.time_s - significant_s_ >= parameters_.close_time) {
     close();
     verdict.reason = "the bias has become insignificant";
   } else if (parameters_.lockout_policy == LockoutPolicy::kAutomatic &&
@@ -278,10 +361,10 @@ void ComplementaryEkf::reject(const Innovation& innovation, FixVerdict& verdict)
 
 void ComplementaryEkf::restart_position(const Innovation& innovation) {
   close();
-  ErrorCovariance covariance = filter_.compensated_covariance();
+  Filter::StateCovariance covariance = filter_.compensated_covariance();
   // As uncertain as the fix shows it to be wrong; heading and odometry errors are kept (F8).
   covariance.topLeftCorner<2, 2>() += innovation.value * innovation.value.transpose();
-  filter_.set_state(ErrorState::Zero(), covariance);
+  filter_.set_state(Filter::State::Zero(), covariance);
   apply(innovation);
   run_.reset();
   detector_.reset();
@@ -290,22 +373,24 @@ void ComplementaryEkf::restart_position(const Innovation& innovation) {
 void ComplementaryEkf::close() {
   filter_.close_bias();
   is_open_ = false;
-  insignificant_ = 0;
+  memory_.clear();
   run_.reset();
   detector_.reset();
 }
 
 void ComplementaryEkf::apply(const Innovation& innovation) {
   filter_.correct(innovation.value - innovation.observation * filter_.bias_free_state(), innovation.observation,
-                  kBiasObservation, innovation.noise);
+                  kBiasObservation, innovation.white);
   feed_back();
 }
 
 void ComplementaryEkf::feed_back() {
-  const ErrorState error = filter_.compensated_state();
+  const Filter::State error = filter_.compensated_state();
   pose_ = {pose_.x + error(0), pose_.y + error(1), wrap_angle(pose_.yaw + error(2))};
   errors_.speed_scale += error(3);
   errors_.yaw_rate_bias_radps += error(4);
+  errors_.yaw_rate_scale += error(5);
+  colour_ += error.tail<2>();
   filter_.shift_origin(error);
 }
 

@@ -38,10 +38,10 @@ double FixNoiseMonitor::ratio(const Fix& a, const Fix& b, double distance_share)
 
 void FixNoiseMonitor::add(const Eigen::Vector2d& position, const Eigen::Matrix2d& covariance,
                           const Eigen::Vector2d& dead_reckoned, double dead_reckoned_variance_m2, double distance_share,
-                          double time_s) {
+                          double time_s, bool learn) {
   const Fix fix{position - dead_reckoned, dead_reckoned, covariance, dead_reckoned_variance_m2, time_s};
   // A pair of neighbours across an outage is no pair of neighbours.
-  if (!fixes_.empty() && time_s - fixes_.back().time_s < 0.5 * parameters_.fix_noise_horizon) {
+  if (learn && !fixes_.empty() && time_s - fixes_.back().time_s < 0.5 * parameters_.fix_noise_horizon) {
     near_.add(ratio(fixes_.back(), fix, distance_share), parameters_.fix_noise_memory);
   }
   while (fixes_.size() > 1 && time_s - fixes_[1].time_s >= parameters_.fix_noise_horizon) fixes_.pop_front();
@@ -52,6 +52,15 @@ void FixNoiseMonitor::add(const Eigen::Vector2d& position, const Eigen::Matrix2d
     }
   }
   fixes_.push_back(fix);
+}
+
+FixNoise FixNoiseMonitor::noise() const {
+  if (!parameters_.adapt_fix_noise) return {1.0, 0.0};
+  if (near_.count < kLeastPairs) return {1.0, 1.0};
+  const double white = std::max(near_.mean, 0.003);
+  static const double kC = getenv("KC") ? atof(getenv("KC")) : 1.0;
+  static const double kW = getenv("KW") ? atof(getenv("KW")) : 0.0;
+  return {kW > 0.0 ? kW : white, kC < 0.0 ? -kC * (far_.count < kLeastPairs ? 1.0 : std::max(0.01, far_.mean)) : kC};
 }
 
 double FixNoiseMonitor::inflation() const {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <deque>
 #include <optional>
 #include <vector>
 
@@ -32,11 +33,13 @@ struct ComplementaryEkfParameters {
   double fix_bias_sigma{20.0};     ///< m per axis, M0: the bias when its filter opens
   double fix_bias_time{30.0};      ///< s, time after which a bias has faded; with fix_bias_sigma this gives Q_b
   double close_probability{0.95};  ///< a bias inside this quantile is insignificant
-  int close_count{5};              ///< count of fixes in a row with an insignificant bias after which the filter closes
+  double close_time{10.0};         ///< s of nothing but an insignificant bias after which the filter closes
+  double bias_onset_time{10.0};    ///< s before its detection at which a bias is taken to have begun
   double detection_horizon{
       10.0};  ///< s of odometry after which the tests' covariance grows no more while fixes are doubted
   /// s, correlation time of a fix's error while the robot stands: reflections change little then (F34)
   double parked_correlation_time{150.0};
+  double fix_correlation_time{30.0};  ///< s, while it moves
   LockoutPolicy lockout_policy{LockoutPolicy::kAutomatic};
   double lockout_timeout{20.0};     ///< s of nothing but rejected fixes
   double bias_open_timeout{120.0};  ///< s of an open bias filter
@@ -51,9 +54,11 @@ struct ComplementaryEkfParameters {
     v("fix_bias_sigma", fix_bias_sigma, positive());
     v("fix_bias_time", fix_bias_time, positive());
     v("close_probability", close_probability, between(0.01, 0.999999));
-    v("close_count", close_count, between(1, 10000));
+    v("close_time", close_time, non_negative());
+    v("bias_onset_time", bias_onset_time, non_negative());
     v("detection_horizon", detection_horizon, non_negative());
-    v("parked_correlation_time", parked_correlation_time, non_negative());
+    v("parked_correlation_time", parked_correlation_time, positive());
+    v("fix_correlation_time", fix_correlation_time, positive());
     v("lockout_policy", lockout_policy);
     v("lockout_timeout", lockout_timeout, positive());
     v("bias_open_timeout", bias_open_timeout, positive());
@@ -101,13 +106,14 @@ class ComplementaryEkf : public Localizer {
   Pose2 correction() const { return compose(pose_, inverse(dead_reckoned_)); }
   const OdometryErrors& odometry_errors() const { return errors_; }
   /// Of the error states, with the bias's share.
-  ErrorCovariance error_covariance() const { return filter_.compensated_covariance(); }
+  ErrorCovariance error_covariance() const {
+    return filter_.compensated_covariance().topLeftCorner<kErrorStates, kErrorStates>();
+  }
 
   bool is_bias_open() const { return is_open_; }
   Eigen::Vector2d bias() const { return filter_.bias(); }
   Eigen::Matrix2d bias_covariance() const { return filter_.bias_covariance(); }
-  /// Factor by which the declared covariance of the fixes is multiplied.
-  double fix_noise_inflation() const { return noise_monitor_.inflation(); }
+  FixNoise fix_noise() const { return noise_of_fix(); }
   /// Whether the gate cannot find anything, as the NIS runs far below its expectation (F4).
   bool is_gate_inert() const { return is_inert_; }
   /// smallest_detectable_jump (m) at the last fix; 0 before the first.
@@ -117,14 +123,14 @@ class ComplementaryEkf : public Localizer {
   std::vector<BiasEstimate> take_bias_estimates();
 
  private:
-  using Filter = TwoStageFilter<kErrorStates, 2, 2>;
+  static constexpr int kStates = kErrorStates + 2;  ///< the last two: the fix's coloured error (m)
+  using Filter = TwoStageFilter<kStates, 2, 2>;
 
   /// One fix, linearised about the pose.
   struct Innovation {
     Eigen::Vector2d value;  ///< m, fix minus predicted antenna, without the bias
     Filter::Observation observation;
-    Eigen::Matrix2d declared;  ///< m^2
-    Eigen::Matrix2d noise;     ///< m^2, as estimation believes it
+    Eigen::Matrix2d white;  ///< m^2
     double time_s;
   };
   /// Since when fixes have been doubted without a break.
@@ -135,14 +141,45 @@ class ComplementaryEkf : public Localizer {
     bool is_frozen;
   };
 
-  /// Factor on the declared covariance, as the fixes scatter and as the robot stands.
-  double noise_inflation() const;
+  /// What a fix changes and a going back has to restore.
+  struct Snapshot {
+    Pose2 pose;
+    OdometryErrors errors;
+    Filter filter{Filter::State::Zero(), Filter::StateCovariance::Zero()};
+    Eigen::Vector2d colour;
+    double moved_since_fix_m;
+    double elapsed_since_fix_s;
+    double last_fix_s;
+    bool had_fix;
+  };
+  struct Step {
+    Twist2 twist;
+    double duration_s;
+  };
+  /// A fix that was used as unbiased, what it led to, and the odometry since.
+  struct Memory {
+    FixMeasurement fix;
+    Snapshot after;
+    std::vector<Step> steps;
+  };
+  Snapshot snapshot() const;
+  void restore(const Snapshot& snapshot);
+  DeadReckoningStep step(const Twist2& twist, double duration_s);
+  Innovation innovate(const FixMeasurement& fix);
+  void remember(const FixMeasurement& fix);
+  /// Opens the bias filter where the bias is taken to have begun, and uses the fixes since then once more.
+  bool open_at_onset(double now_s, const Eigen::Matrix2d& m0);
+  /// Lets the bias change up to the time of a fix.
+  void move_bias(double time_s);
+  FixNoise noise_of_fix() const;
+  /// Lets the coloured error change up to a fix of this declared covariance (m^2).
+  void move_colour(const FixMeasurement& fix, const FixNoise& noise);
   /// Without a heading: takes the fix for the position and for the search. True where the heading was found.
   bool search_heading(const FixMeasurement& fix, const Innovation& innovation);
-  void decide(const Innovation& innovation, FixVerdict& verdict);
+  void decide(const FixMeasurement& fix, const Innovation& innovation, FixVerdict& verdict);
   void decide_compensated(const Innovation& innovation, const BiasDetection& detection, FixVerdict& verdict);
-  void decide_open(const Innovation& innovation, FixVerdict& verdict);
-  void open_or_reject(const Innovation& innovation, FixVerdict& verdict);
+  void decide_open(const FixMeasurement& fix, const Innovation& innovation, FixVerdict& verdict);
+  void open_or_reject(const FixMeasurement& fix, const Innovation& innovation, FixVerdict& verdict);
   void reject(const Innovation& innovation, FixVerdict& verdict);
   /// Whether the first fix after the opening speaks for no bias; ends the bias filter where it does.
   bool is_false_alarm(const Innovation& innovation, double direct_nis, FixVerdict& verdict);
@@ -167,7 +204,8 @@ class ComplementaryEkf : public Localizer {
   Pose2 dead_reckoned_;
   OdometryErrors errors_;
   /// Of the errors of pose_ and errors_. After each feedback the compensated error is 0.
-  Filter filter_{ErrorState::Zero(), ErrorCovariance::Zero()};
+  Filter filter_{Filter::State::Zero(), Filter::StateCovariance::Zero()};
+  Eigen::Vector2d colour_{Eigen::Vector2d::Zero()};  ///< m, coloured error of the fixes
   Eigen::Vector2d path_{Eigen::Vector2d::Zero()};  ///< m, moved since the start, without corrections
   double path_variance_m2_{0.0};
 
@@ -177,7 +215,8 @@ class ComplementaryEkf : public Localizer {
   bool is_confirmed_{false};  ///< a fix after the opening agreed with the bias
   double last_fix_s_{0.0};
   bool had_fix_{false};
-  int insignificant_{0};
+  double significant_s_{0.0};  ///< when the bias was last significant
+  std::deque<Memory> memory_;
   bool is_inert_{false};
   std::optional<Run> run_;
   std::optional<HeadingInitializer> heading_search_;  ///< while the heading is unknown

@@ -29,6 +29,7 @@ struct FixNoiseParameters {
 /// error of correlation rho from fix to fix has near = (1 - rho) far; averaging such fixes is worth as much as
 /// averaging white ones whose variance is (1 + rho) / (1 - rho) = (2 far - near) / near times larger. It depends on no
 /// estimate of a filter's, so that it cannot talk itself into anything.
+struct FixNoise { double white{1.0}; double coloured{0.0}; };
 class FixNoiseMonitor {
  public:
   /// Requires parameters without faults.
@@ -38,12 +39,13 @@ class FixNoiseMonitor {
   /// same axes) and its accumulated variance (m^2), of which the difference between two fixes counts; the share of the
   /// distance (1) that heading and scale may be wrong by; time (s), ascending.
   void add(const Eigen::Vector2d& position, const Eigen::Matrix2d& covariance, const Eigen::Vector2d& dead_reckoned,
-           double dead_reckoned_variance_m2, double distance_share, double time_s);
+           double dead_reckoned_variance_m2, double distance_share, double time_s, bool learn = true);
 
   void reset();
 
   /// Factor on the declared covariance for estimation, at least 1; 1 until there are enough fixes.
   double inflation() const;
+  FixNoise noise() const;
   double near() const { return near_.mean; }
   double far() const { return far_.mean; }
 
