@@ -182,7 +182,7 @@ void ComplementaryEkf::move_bias(double time_s) {
 FixVerdict ComplementaryEkf::correct(const FixMeasurement& fix) {
   const Eigen::Vector2d predicted = transform_point(pose_, fix.antenna_in_body);
   noise_monitor_.add(fix.position, fix.covariance, path_ + predicted - pose_.position(), path_variance_m2_,
-                     std::sqrt(filter_.compensated_covariance().diagonal().segment<2>(2).sum()), fix.time_s, !run_);
+                     std::sqrt(filter_.compensated_covariance().diagonal().segment<2>(2).sum()), fix.time_s, run_.has_value());
   if (is_open_) move_bias(fix.time_s);
   const Innovation innovation = innovate(fix);
   if (run_ && fix.time_s - run_->last_s > parameters_.lockout_gap) run_.reset();

@@ -30,16 +30,16 @@ EnumNames<LockoutPolicy> enum_names(LockoutPolicy);
 
 struct ComplementaryEkfParameters {
   ComplementaryMode mode{ComplementaryMode::kCompensated};
-  double fix_bias_sigma{20.0};     ///< m per axis, M0: the bias when its filter opens
-  double fix_bias_time{30.0};      ///< s, time after which a bias has faded; with fix_bias_sigma this gives Q_b
+  double fix_bias_sigma{15.0};     ///< m per axis, M0: the bias when its filter opens
+  double fix_bias_time{15.0};      ///< s, time after which a bias has faded; with fix_bias_sigma this gives Q_b
   double close_probability{0.95};  ///< a bias inside this quantile is insignificant
   double close_time{10.0};         ///< s of nothing but an insignificant bias after which the filter closes
-  double bias_onset_time{10.0};    ///< s before its detection at which a bias is taken to have begun
+  double bias_onset_time{20.0};    ///< s before its detection at which a bias is taken to have begun
   double detection_horizon{
       10.0};  ///< s of odometry after which the tests' covariance grows no more while fixes are doubted
   /// s, correlation time of a fix's error while the robot stands: reflections change little then (F34)
   double parked_correlation_time{150.0};
-  double fix_correlation_time{30.0};  ///< s, while it moves
+  double fix_correlation_time{20.0};  ///< s, correlation time of the coloured part of a fix's error while it moves
   LockoutPolicy lockout_policy{LockoutPolicy::kAutomatic};
   double lockout_timeout{20.0};     ///< s of nothing but rejected fixes
   double bias_open_timeout{120.0};  ///< s of an open bias filter
