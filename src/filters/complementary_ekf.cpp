@@ -10,8 +10,6 @@ namespace urban_gnss {
 namespace {
 
 constexpr int kFixDof = 2;
-/// A robot that moves less than this between two fixes stands.
-constexpr double kParked_mps = 0.02;
 /// A heading with a larger standard deviation than this (rad) is unknown; that of a uniform one is 1.81.
 constexpr double kUnknownHeading_rad = 1.5;
 const Eigen::Matrix2d kBiasObservation = Eigen::Matrix2d::Identity();  // C: the bias adds to the fix
@@ -100,89 +98,16 @@ void ComplementaryEkf::move(const Twist2& twist, double duration_s) {
   if (!memory_.empty()) memory_.back().steps.push_back({twist, duration_s});
 }
 
-ComplementaryEkf::Snapshot ComplementaryEkf::snapshot() const {
-  return {pose_, errors_, filter_, colour_, moved_since_fix_m_, elapsed_since_fix_s_, last_fix_s_, had_fix_};
-}
-
-void ComplementaryEkf::restore(const Snapshot& from) {
-  pose_ = from.pose;
-  errors_ = from.errors;
-  filter_ = from.filter;
-  colour_ = from.colour;
-  moved_since_fix_m_ = from.moved_since_fix_m;
-  elapsed_since_fix_s_ = from.elapsed_since_fix_s;
-  last_fix_s_ = from.last_fix_s;
-  had_fix_ = from.had_fix;
-}
-
-void ComplementaryEkf::remember(const FixMeasurement& fix) {
-  if (is_open_ || heading_search_ || parameters_.mode != ComplementaryMode::kCompensated) {
-    memory_.clear();
-    return;
-  }
-  while (memory_.size() > 1 && fix.time_s - memory_[1].fix.time_s > parameters_.bias_onset_time) memory_.pop_front();
-  memory_.push_back({fix, snapshot(), {}});
-}
-
-bool ComplementaryEkf::open_at_onset(double now_s, const Eigen::Matrix2d& m0) {
-  while (memory_.size() > 1 && now_s - memory_.front().fix.time_s > parameters_.bias_onset_time) memory_.pop_front();
-  if (is_open_ || memory_.empty()) {
-    filter_.open_bias(m0);
-    return false;
-  }
-  restore(memory_.front().after);
-  filter_.open_bias(m0);
-  for (std::size_t i = 0; i < memory_.size(); ++i) {
-    for (const Step& each : memory_[i].steps) step(each.twist, each.duration_s);
-    if (i + 1 == memory_.size()) break;
-    const FixMeasurement& fix = memory_[i + 1].fix;
-    move_bias(fix.time_s);
-    apply(innovate(fix));
-    last_fix_s_ = fix.time_s;
-    moved_since_fix_m_ = 0.0;
-    elapsed_since_fix_s_ = 0.0;
-  }
-  memory_.clear();
-  return true;
-}
-
 void ComplementaryEkf::set_mode(ComplementaryMode mode) {
   if (mode != ComplementaryMode::kCompensated) close();
   parameters_.mode = mode;
 }
 
-FixNoise ComplementaryEkf::noise_of_fix() const {
-  return parameters_.mode == ComplementaryMode::kCompensated ? noise_monitor_.noise() : FixNoise{};
-}
-
-ComplementaryEkf::Innovation ComplementaryEkf::innovate(const FixMeasurement& fix) {
-  const FixNoise noise = noise_of_fix();
-  move_colour(fix, noise);
-  const Eigen::Vector2d predicted = transform_point(pose_, fix.antenna_in_body);
-  const Eigen::Vector2d lever = predicted - pose_.position();
-  Innovation innovation;
-  innovation.value = fix.position - predicted - colour_;
-  innovation.observation.setZero();
-  innovation.observation.leftCols<2>().setIdentity();
-  innovation.observation.col(2) << -lever.y(), lever.x();
-  innovation.observation.rightCols<2>().setIdentity();
-  innovation.white = noise.white * fix.covariance;
-  innovation.time_s = fix.time_s;
-  return innovation;
-}
-
-void ComplementaryEkf::move_bias(double time_s) {
-  const double elapsed_s = std::max(0.0, time_s - last_fix_s_);
-  const double share = std::exp(-elapsed_s / parameters_.fix_bias_time);
-  const double grown = parameters_.fix_bias_sigma * parameters_.fix_bias_sigma * (1.0 - share * share);
-  filter_.fade_bias(share);
-  filter_.grow_bias(grown * Eigen::Matrix2d::Identity());
-}
-
 FixVerdict ComplementaryEkf::correct(const FixMeasurement& fix) {
   const Eigen::Vector2d predicted = transform_point(pose_, fix.antenna_in_body);
   noise_monitor_.add(fix.position, fix.covariance, path_ + predicted - pose_.position(), path_variance_m2_,
-                     std::sqrt(filter_.compensated_covariance().diagonal().segment<2>(2).sum()), fix.time_s, run_.has_value());
+                     std::sqrt(filter_.compensated_covariance().diagonal().segment<2>(2).sum()), fix.time_s,
+                     run_.has_value());
   if (is_open_) move_bias(fix.time_s);
   const Innovation innovation = innovate(fix);
   if (run_ && fix.time_s - run_->last_s > parameters_.lockout_gap) run_.reset();
@@ -202,18 +127,6 @@ FixVerdict ComplementaryEkf::correct(const FixMeasurement& fix) {
   remember(fix);
   publish(fix, predicted, verdict);
   return verdict;
-}
-
-void ComplementaryEkf::move_colour(const FixMeasurement& fix, const FixNoise& noise) {
-  const bool is_parked = elapsed_since_fix_s_ > 0.0 && moved_since_fix_m_ < kParked_mps * elapsed_since_fix_s_;
-  const double time_s = is_parked ? parameters_.parked_correlation_time : parameters_.fix_correlation_time;
-  const double share = had_fix_ ? std::exp(-std::max(0.0, fix.time_s - last_fix_s_) / time_s) : 0.0;
-  Filter::StateCovariance transition = Filter::StateCovariance::Identity();
-  transition.bottomRightCorner<2, 2>() *= share;
-  Filter::StateCovariance q = Filter::StateCovariance::Zero();
-  q.bottomRightCorner<2, 2>() = (1.0 - share * share) * noise.coloured * fix.covariance;
-  filter_.predict(transition * filter_.bias_free_state(), transition, q);
-  colour_ *= share;
 }
 
 bool ComplementaryEkf::search_heading(const FixMeasurement& fix, const Innovation& innovation) {
@@ -424,6 +337,8 @@ PoseEstimate ComplementaryEkf::estimate() const {
 LocalizerHealth ComplementaryEkf::health() const {
   LocalizerHealth health;
   health.heading_sigma_rad = std::sqrt(filter_.compensated_covariance()(2, 2));
+  health.bias_radius_m = bias().norm();
+  health.is_gate_inert = is_inert_;
   return health;
 }
 

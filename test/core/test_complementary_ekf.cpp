@@ -19,10 +19,10 @@ struct DirectEkf {
   ErrorCovariance covariance{ErrorCovariance::Zero()};
 
   ErrorState moved(const ErrorState& s, const Twist2& twist, double duration_s) const {
-    const Pose2 pose =
-        urban_gnss::move({s(0), s(1), s(2)}, {(1.0 + s(3)) * twist.speed_mps, twist.yaw_rate_radps + s(4)}, duration_s);
+    const Twist2 corrected{(1.0 + s(3)) * twist.speed_mps, (1.0 + s(5)) * twist.yaw_rate_radps + s(4)};
+    const Pose2 pose = urban_gnss::move({s(0), s(1), s(2)}, corrected, duration_s);
     ErrorState result;
-    result << pose.x, pose.y, pose.yaw, s(3), s(4);
+    result << pose.x, pose.y, pose.yaw, s(3), s(4), s(5);
     return result;
   }
   void move(const Twist2& twist, double duration_s) {
@@ -35,7 +35,7 @@ struct DirectEkf {
       jacobian.col(i) = difference / (2.0 * kDelta);
     }
     const DeadReckoningStep step =
-        dead_reckon({state(0), state(1), state(2)}, {state(3), state(4)}, twist, duration_s, odometry);
+        dead_reckon({state(0), state(1), state(2)}, {state(3), state(4), state(5)}, twist, duration_s, odometry);
     state = moved(state, twist, duration_s);
     covariance = jacobian * covariance * jacobian.transpose() + step.noise;
   }
@@ -54,13 +54,12 @@ struct DirectEkf {
 };
 
 TEST(ComplementaryEkf, EqualsADirectFilterOfThePose) {
-  ComplementaryEkfParameters parameters =
-      with(ComplementaryEkfParameters(), "{mode: standard, adapt_fix_noise: false}");
+  ComplementaryEkfParameters parameters = with(ComplementaryEkfParameters(), "{mode: standard}");
   ComplementaryEkf filter(parameters);
   DirectEkf direct{parameters.odometry};
   const PoseEstimate start = pose_with_sigma({3.0, -2.0, 3.0}, 1.0, 0.1);
   filter.initialize(start);
-  direct.state << 3.0, -2.0, 3.0, 0.0, 0.0;
+  direct.state << 3.0, -2.0, 3.0, 0.0, 0.0, 0.0;
   direct.covariance = initial_error_covariance(start.covariance, parameters.odometry);
   RandomEngine engine = make_engine(1);
   for (int k = 1; k <= 2000; ++k) {
@@ -78,6 +77,7 @@ TEST(ComplementaryEkf, EqualsADirectFilterOfThePose) {
     ASSERT_TRUE(near(filter.pose(), {direct.state(0), direct.state(1), direct.state(2)}, 1e-4)) << k;
     ASSERT_NEAR(filter.odometry_errors().speed_scale, direct.state(3), 1e-5);
     ASSERT_NEAR(filter.odometry_errors().yaw_rate_bias_radps, direct.state(4), 1e-5);
+    ASSERT_NEAR(filter.odometry_errors().yaw_rate_scale, direct.state(5), 1e-5);
     ASSERT_LT((filter.error_covariance() - direct.covariance).cwiseAbs().maxCoeff(), 1e-4) << k;
   }
 }

@@ -277,14 +277,12 @@ TEST(ComplementaryEkfParameters, EachHasAnEffect) {
       other = "dead_reckoning";
     } else if (value == "true" || value == "false") {
       other = value == "true" ? "false" : "true";
-    } else if (name == "close_count" || name == "inert_window") {
+    } else if (name == "inert_window") {
       other = std::to_string(std::stoi(value) / 2);
     } else if (name == "gate_probability" || name == "close_probability") {
       other = "0.6";
     } else if (name == "inert_probability") {
       other = "0.09";
-    } else if (name == "fix_noise_max_inflation") {
-      other = "1.01";
     } else {
       other = std::to_string(0.5 * std::stod(value));
     }
@@ -294,7 +292,7 @@ TEST(ComplementaryEkfParameters, EachHasAnEffect) {
 
 TEST(ComplementaryEkfParameters, BadOnesAreNamed) {
   const YAML::Node map = YAML::Load(
-      "{mode: bold, gate_probability: 1.0, close_count: 0, fix_bias_time: 0.0, lockout_policy: never, odom_scale_walk: "
+      "{mode: bold, gate_probability: 1.0, close_time: -1.0, fix_bias_time: 0.0, lockout_policy: never, odom_scale_walk: "
       "-1.0, fix_bias_tim: 3.0}");
   ComplementaryEkfParameters parameters;
   ParameterReader reader(map);

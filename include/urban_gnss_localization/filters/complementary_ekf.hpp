@@ -30,8 +30,8 @@ EnumNames<LockoutPolicy> enum_names(LockoutPolicy);
 
 struct ComplementaryEkfParameters {
   ComplementaryMode mode{ComplementaryMode::kCompensated};
-  double fix_bias_sigma{15.0};     ///< m per axis, M0: the bias when its filter opens
-  double fix_bias_time{15.0};      ///< s, time after which a bias has faded; with fix_bias_sigma this gives Q_b
+  double fix_bias_sigma{12.0};     ///< m per axis, M0: the bias when its filter opens
+  double fix_bias_time{20.0};      ///< s, time after which a bias has faded; with fix_bias_sigma this gives Q_b
   double close_probability{0.95};  ///< a bias inside this quantile is insignificant
   double close_time{10.0};         ///< s of nothing but an insignificant bias after which the filter closes
   double bias_onset_time{20.0};    ///< s before its detection at which a bias is taken to have begun
@@ -39,7 +39,7 @@ struct ComplementaryEkfParameters {
       10.0};  ///< s of odometry after which the tests' covariance grows no more while fixes are doubted
   /// s, correlation time of a fix's error while the robot stands: reflections change little then (F34)
   double parked_correlation_time{150.0};
-  double fix_correlation_time{20.0};  ///< s, correlation time of the coloured part of a fix's error while it moves
+  double fix_correlation_time{30.0};  ///< s, correlation time of the coloured part of a fix's error while it moves
   LockoutPolicy lockout_policy{LockoutPolicy::kAutomatic};
   double lockout_timeout{20.0};     ///< s of nothing but rejected fixes
   double bias_open_timeout{120.0};  ///< s of an open bias filter
@@ -78,8 +78,12 @@ struct ComplementaryEkfParameters {
 ///   2. where it is taken for biased, open the bias filter: b = 0, covariance M0 (TwoStageFilter);
 ///   3. while open, let the bias walk, correct both stages, feed back the compensated error;
 ///   4. where the very next fix speaks for no bias, it was a false alarm: go on as if it had not been;
-///   5. close it when the bias has been insignificant for some fixes, or a fix agrees with no bias again at once.
-/// The error states are the pose and, where estimate_odometry_errors, what the odometry is wrong by.
+///   5. close it when the bias has been insignificant for some time, or a fix agrees with no bias again at once.
+/// A bias that builds up slowly has been fused for a while when it is detected. So 2. goes back: the state of
+/// bias_onset_time ago is restored, its bias filter opened, and odometry and fixes since then are used once more (F5).
+/// The error states are the pose, where estimate_odometry_errors what the odometry is wrong by, and the coloured part
+/// of the fix's error of nominal size (FixNoiseMonitor; compensated mode only: the others take all of it for white, as
+/// the paper's conventional filter does).
 ///
 /// A heading that is wrong by radians is beyond a linearisation: started without a heading, the position follows the
 /// fixes, and the filter starts once HeadingInitializer has found one.
@@ -141,7 +145,7 @@ class ComplementaryEkf : public Localizer {
     bool is_frozen;
   };
 
-  /// What a fix changes and a going back has to restore.
+  /// What moves and fixes change and going back has to restore.
   struct Snapshot {
     Pose2 pose;
     OdometryErrors errors;
@@ -163,11 +167,13 @@ class ComplementaryEkf : public Localizer {
     std::vector<Step> steps;
   };
   Snapshot snapshot() const;
-  void restore(const Snapshot& snapshot);
+  void restore(const Snapshot& from);
   DeadReckoningStep step(const Twist2& twist, double duration_s);
+  /// Moves the coloured error to the fix and linearises about the pose.
   Innovation innovate(const FixMeasurement& fix);
   void remember(const FixMeasurement& fix);
-  /// Opens the bias filter where the bias is taken to have begun, and uses the fixes since then once more.
+  /// Opens the bias filter; where a state of before the bias began is remembered, there, and uses odometry and fixes
+  /// since then once more, the fix at hand excepted. Whether it went back.
   bool open_at_onset(double now_s, const Eigen::Matrix2d& m0);
   /// Lets the bias change up to the time of a fix.
   void move_bias(double time_s);
@@ -206,7 +212,7 @@ class ComplementaryEkf : public Localizer {
   /// Of the errors of pose_ and errors_. After each feedback the compensated error is 0.
   Filter filter_{Filter::State::Zero(), Filter::StateCovariance::Zero()};
   Eigen::Vector2d colour_{Eigen::Vector2d::Zero()};  ///< m, coloured error of the fixes
-  Eigen::Vector2d path_{Eigen::Vector2d::Zero()};  ///< m, moved since the start, without corrections
+  Eigen::Vector2d path_{Eigen::Vector2d::Zero()};    ///< m, moved since the start, without corrections
   double path_variance_m2_{0.0};
 
   bool is_open_{false};
