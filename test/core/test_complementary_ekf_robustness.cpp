@@ -243,6 +243,8 @@ std::string trace(const std::string& yaml) {
     drive.run(30.0, note);
     drive.bias = [](double since) { return Eigen::Vector2d(0.2 * since, 0.0); };
     drive.run(40.0, note);
+    drive.bias = [](double since) { return Eigen::Vector2d(20.0 * std::exp(-since / 20.0), 0.0); };
+    drive.run(120.0, note);
     drive.bias = far_away;
     drive.run(12.0, note);
     drive.run_without_fixes(3.0);
