@@ -38,7 +38,7 @@ struct ComplementaryEkfParameters {
   double detection_horizon{
       10.0};  ///< s of odometry after which the tests' covariance grows no more while fixes are doubted
   /// s, correlation time of a fix's error while the robot stands: reflections change little then (F34)
-  double parked_correlation_time{60.0};
+  double parked_correlation_time{150.0};
   double fix_correlation_time{30.0};  ///< s, correlation time of the coloured part of a fix's error while it moves
   LockoutPolicy lockout_policy{LockoutPolicy::kAutomatic};
   double lockout_timeout{20.0};     ///< s of nothing but rejected fixes
