@@ -294,7 +294,8 @@ TEST(ComplementaryEkfParameters, EachHasAnEffect) {
 
 TEST(ComplementaryEkfParameters, BadOnesAreNamed) {
   const YAML::Node map = YAML::Load(
-      "{mode: bold, gate_probability: 1.0, close_time: -1.0, fix_bias_time: 0.0, lockout_policy: never, odom_scale_walk: "
+      "{mode: bold, gate_probability: 1.0, close_time: -1.0, fix_bias_time: 0.0, lockout_policy: never, "
+      "odom_scale_walk: "
       "-1.0, fix_bias_tim: 3.0}");
   ComplementaryEkfParameters parameters;
   ParameterReader reader(map);
