@@ -125,6 +125,23 @@ class Experiment {
 
 }  // namespace
 
+std::size_t phase_of(const BiasRun& run, Stamp stamp) {
+  if (!run.between || stamp < run.between->first) return 0;
+  return stamp <= run.between->second ? 1 : 2;
+}
+
+std::optional<double> settling_time_s(const BiasRun& run, const std::vector<BiasEstimate>& biases) {
+  if (!run.between || biases.empty()) return std::nullopt;
+  const Stamp left = run.between->second;
+  Stamp since = left;
+  for (const BiasEstimate& bias : biases) {
+    if (bias.stamp < left) continue;
+    if (bias.stamp - since >= kSettled) return to_seconds(since - left);
+    if (bias.in_shadow) since = bias.stamp;
+  }
+  return std::nullopt;
+}
+
 BiasRun run_bias_experiment(const Scenario& scenario, const BiasExperimentConditions& conditions) {
   BiasRun run;
   CitySimulator simulator(scenario);

@@ -10,6 +10,8 @@ namespace urban_gnss {
 namespace {
 
 constexpr int kFixDof = 2;
+/// A robot that moves less than this between two fixes stands.
+constexpr double kParked_mps = 0.02;
 /// A heading with a larger standard deviation than this (rad) is unknown; that of a uniform one is 1.81.
 constexpr double kUnknownHeading_rad = 1.5;
 const Eigen::Matrix2d kBiasObservation = Eigen::Matrix2d::Identity();  // C: the bias adds to the fix
@@ -45,17 +47,14 @@ void ComplementaryEkf::initialize(const PoseEstimate& start) {
   pose_ = start.pose;
   dead_reckoned_ = start.pose;
   errors_ = {};
-  Filter::StateCovariance covariance = Filter::StateCovariance::Zero();
-  covariance.topLeftCorner<kErrorStates, kErrorStates>() =
-      initial_error_covariance(start.covariance, parameters_.odometry);
-  filter_.set_state(Filter::State::Zero(), covariance);
-  colour_.setZero();
+  filter_.set_state(ErrorState::Zero(), initial_error_covariance(start.covariance, parameters_.odometry));
   detector_.reset();
   noise_monitor_.reset();
   path_.setZero();
   path_variance_m2_ = 0.0;
   is_open_ = false;
   had_fix_ = false;
+  insignificant_ = 0;
   is_inert_ = false;
   run_.reset();
   heading_search_.reset();
@@ -65,10 +64,9 @@ void ComplementaryEkf::initialize(const PoseEstimate& start) {
   elapsed_since_fix_s_ = 0.0;
   last_test_covariance_.setZero();
   bias_estimates_.clear();
-  memory_.clear();
 }
 
-DeadReckoningStep ComplementaryEkf::step(const Twist2& twist, double duration_s) {
+void ComplementaryEkf::move(const Twist2& twist, double duration_s) {
   DeadReckoningStep step = dead_reckon(pose_, errors_, twist, duration_s, parameters_.odometry);
   const double distance = std::abs(twist.speed_mps) * duration_s;
   if (heading_search_) {
@@ -80,22 +78,11 @@ DeadReckoningStep ComplementaryEkf::step(const Twist2& twist, double duration_s)
   }
   moved_since_fix_m_ += distance;
   elapsed_since_fix_s_ += duration_s;
-  Filter::StateCovariance transition = Filter::StateCovariance::Identity();
-  Filter::StateCovariance noise = Filter::StateCovariance::Zero();
-  transition.topLeftCorner<kErrorStates, kErrorStates>() = step.transition;
-  noise.topLeftCorner<kErrorStates, kErrorStates>() = step.noise;
-  filter_.predict(transition * filter_.bias_free_state(), transition, noise);
+  filter_.predict(step.transition * filter_.bias_free_state(), step.transition, step.noise);
+  path_ += step.pose.position() - pose_.position();
+  path_variance_m2_ += 0.5 * step.noise.topLeftCorner<2, 2>().trace();
   pose_ = step.pose;
-  return step;
-}
-
-void ComplementaryEkf::move(const Twist2& twist, double duration_s) {
-  const Eigen::Vector2d from = pose_.position();
-  const DeadReckoningStep moved = step(twist, duration_s);
-  path_ += pose_.position() - from;
-  path_variance_m2_ += 0.5 * moved.noise.topLeftCorner<2, 2>().trace();
   dead_reckoned_ = urban_gnss::move(dead_reckoned_, twist, duration_s);
-  if (!memory_.empty()) memory_.back().steps.push_back({twist, duration_s});
 }
 
 void ComplementaryEkf::set_mode(ComplementaryMode mode) {
@@ -105,11 +92,26 @@ void ComplementaryEkf::set_mode(ComplementaryMode mode) {
 
 FixVerdict ComplementaryEkf::correct(const FixMeasurement& fix) {
   const Eigen::Vector2d predicted = transform_point(pose_, fix.antenna_in_body);
-  noise_monitor_.add(fix.position, fix.covariance, path_ + predicted - pose_.position(), path_variance_m2_,
-                     std::sqrt(filter_.compensated_covariance().diagonal().segment<2>(2).sum()), fix.time_s,
-                     run_.has_value());
-  if (is_open_) move_bias(fix.time_s);
-  const Innovation innovation = innovate(fix);
+  const Eigen::Vector2d lever = predicted - pose_.position();
+  noise_monitor_.add(fix.position, fix.covariance, path_ + lever, path_variance_m2_,
+                     std::sqrt(filter_.compensated_covariance().diagonal().segment<2>(2).sum()), fix.time_s);
+
+  Innovation innovation;
+  innovation.value = fix.position - predicted;
+  innovation.observation.setZero();
+  innovation.observation.leftCols<2>().setIdentity();
+  innovation.observation.col(2) << -lever.y(), lever.x();
+  innovation.declared = fix.covariance;
+  innovation.noise = noise_inflation() * fix.covariance;
+  innovation.time_s = fix.time_s;
+
+  if (is_open_) {
+    const double elapsed_s = std::max(0.0, fix.time_s - last_fix_s_);
+    const double share = std::exp(-elapsed_s / parameters_.fix_bias_time);
+    const double grown = parameters_.fix_bias_sigma * parameters_.fix_bias_sigma * (1.0 - share * share);
+    filter_.fade_bias(share);
+    filter_.grow_bias(grown * Eigen::Matrix2d::Identity());
+  }
   if (run_ && fix.time_s - run_->last_s > parameters_.lockout_gap) run_.reset();
 
   FixVerdict verdict;
@@ -118,15 +120,27 @@ FixVerdict ComplementaryEkf::correct(const FixMeasurement& fix) {
     verdict.reason =
         search_heading(fix, innovation) ? "heading found from fixes and motion" : "used to find the heading";
   } else {
-    decide(fix, innovation, verdict);
+    decide(innovation, verdict);
   }
   last_fix_s_ = fix.time_s;
   had_fix_ = true;
   moved_since_fix_m_ = 0.0;
   elapsed_since_fix_s_ = 0.0;
-  remember(fix);
   publish(fix, predicted, verdict);
   return verdict;
+}
+
+bool ComplementaryEkf::is_adaptive() const {
+  return parameters_.adapt_every_mode || parameters_.mode == ComplementaryMode::kCompensated;
+}
+
+double ComplementaryEkf::noise_inflation() const {
+  if (!is_adaptive()) return 1.0;
+  const double inflation = noise_monitor_.inflation();
+  const bool is_parked = elapsed_since_fix_s_ > 0.0 && moved_since_fix_m_ < kParked_mps * elapsed_since_fix_s_;
+  if (!is_parked) return inflation;
+  // The mean of errors of correlation time tau over a time T has the variance 2 tau / T of one of them.
+  return std::max(inflation, 2.0 * parameters_.parked_correlation_time / elapsed_since_fix_s_);
 }
 
 bool ComplementaryEkf::search_heading(const FixMeasurement& fix, const Innovation& innovation) {
@@ -146,20 +160,21 @@ bool ComplementaryEkf::search_heading(const FixMeasurement& fix, const Innovatio
   return true;
 }
 
-void ComplementaryEkf::decide(const FixMeasurement& fix, const Innovation& innovation, FixVerdict& verdict) {
-  const Eigen::Matrix2d covariance = prediction_covariance(innovation) + innovation.white;
+void ComplementaryEkf::decide(const Innovation& innovation, FixVerdict& verdict) {
+  const Eigen::Matrix2d covariance = prediction_covariance(innovation) + innovation.declared;
   last_test_covariance_ = covariance;
   verdict.nis_dof = kFixDof;
   verdict.nis_threshold = detector_.threshold();
   verdict.decision = FixDecision::kAccepted;
   if (is_open_) {
-    decide_open(fix, innovation, verdict);
+    decide_open(innovation, verdict);
     return;
   }
   const BiasDetection detection = detector_.test(innovation.value, covariance);
   verdict.nis = detection.nis;
   is_inert_ = detection.is_inert;
-  if (parameters_.mode == ComplementaryMode::kStandard || !detection.is_biased()) {
+  const bool is_biased = is_adaptive() ? detection.is_biased() : detection.is_jump;
+  if (parameters_.mode == ComplementaryMode::kStandard || !is_biased) {
     run_.reset();
     apply(innovation);
     if (is_inert_) verdict.reason = "gate inert: the fixes scatter far less than their covariance says";
@@ -169,40 +184,35 @@ void ComplementaryEkf::decide(const FixMeasurement& fix, const Innovation& innov
   if (parameters_.mode == ComplementaryMode::kGated) {
     reject(innovation, verdict);
   } else {
-    open_or_reject(fix, innovation, verdict);
+    open_or_reject(innovation, verdict);
   }
 }
 
-void ComplementaryEkf::open_or_reject(const FixMeasurement& fix, const Innovation& innovation, FixVerdict& verdict) {
+void ComplementaryEkf::open_or_reject(const Innovation& innovation, FixVerdict& verdict) {
   const Eigen::Matrix2d m0 = parameters_.fix_bias_sigma * parameters_.fix_bias_sigma * Eigen::Matrix2d::Identity();
-  const Eigen::Matrix2d covariance = prediction_covariance(innovation) + innovation.white + m0;
+  const Eigen::Matrix2d covariance = prediction_covariance(innovation) + innovation.declared + m0;
   if (normalised_innovation_squared(innovation.value, covariance) > detector_.threshold()) {
     verdict.reason = "farther away than a bias explains";
     reject(innovation, verdict);
     return;
   }
-  const bool has_gone_back = open_at_onset(innovation.time_s, m0);
+  filter_.open_bias(m0);
   if (!is_open_) opened_s_ = innovation.time_s;
   is_open_ = true;
-  significant_s_ = innovation.time_s;
   is_confirmed_ = false;
   opening_nis_ = normalised_innovation_squared(innovation.value, covariance - m0);
+  insignificant_ = 0;
   doubt(innovation);
-  if (has_gone_back) {
-    move_bias(fix.time_s);
-    apply(innovate(fix));
-  } else {
-    apply(innovation);
-  }
+  apply(innovation);
   verdict.decision = FixDecision::kBiasCompensated;
 }
 
-void ComplementaryEkf::decide_open(const FixMeasurement& fix, const Innovation& innovation, FixVerdict& verdict) {
+void ComplementaryEkf::decide_open(const Innovation& innovation, FixVerdict& verdict) {
   const Eigen::Vector2d compensated = innovation.value - filter_.bias();
   verdict.nis = normalised_innovation_squared(
-      compensated, filter_.innovation_covariance(innovation.observation, kBiasObservation, innovation.white));
+      compensated, filter_.innovation_covariance(innovation.observation, kBiasObservation, innovation.declared));
   const double direct =
-      normalised_innovation_squared(innovation.value, prediction_covariance(innovation) + innovation.white);
+      normalised_innovation_squared(innovation.value, prediction_covariance(innovation) + innovation.declared);
   if (!is_confirmed_ && is_false_alarm(innovation, direct, verdict)) return;
   if (verdict.nis <= detector_.threshold()) {
     is_confirmed_ = true;
@@ -220,13 +230,13 @@ void ComplementaryEkf::decide_open(const FixMeasurement& fix, const Innovation& 
     apply(innovation);
     return;
   }
-  open_or_reject(fix, innovation, verdict);
+  open_or_reject(innovation, verdict);
 }
 
 bool ComplementaryEkf::is_false_alarm(const Innovation& innovation, double direct_nis, FixVerdict& verdict) {
-  const Eigen::Matrix2d without = prediction_covariance(innovation) + innovation.white;
+  const Eigen::Matrix2d without = prediction_covariance(innovation) + innovation.declared;
   const Eigen::Matrix2d with =
-      filter_.innovation_covariance(innovation.observation, kBiasObservation, innovation.white);
+      filter_.innovation_covariance(innovation.observation, kBiasObservation, innovation.declared);
   // Likelihood of the fix without a bias against that with the bias that the last fix showed.
   const bool speaks_for_none = direct_nis <= detector_.threshold() && direct_nis + std::log(without.determinant()) <
                                                                           verdict.nis + std::log(with.determinant());
@@ -247,8 +257,8 @@ bool ComplementaryEkf::is_false_alarm(const Innovation& innovation, double direc
 }
 
 void ComplementaryEkf::close_if_insignificant(const Innovation& innovation, FixVerdict& verdict) {
-  if (bias_statistic() > close_threshold_) significant_s_ = innovation.time_s;
-  if (innovation.time_s - significant_s_ >= parameters_.close_time) {
+  insignificant_ = bias_statistic() <= close_threshold_ ? insignificant_ + 1 : 0;
+  if (insignificant_ >= parameters_.close_count) {
     close();
     verdict.reason = "the bias has become insignificant";
   } else if (parameters_.lockout_policy == LockoutPolicy::kAutomatic &&
@@ -274,10 +284,10 @@ void ComplementaryEkf::reject(const Innovation& innovation, FixVerdict& verdict)
 
 void ComplementaryEkf::restart_position(const Innovation& innovation) {
   close();
-  Filter::StateCovariance covariance = filter_.compensated_covariance();
+  ErrorCovariance covariance = filter_.compensated_covariance();
   // As uncertain as the fix shows it to be wrong; heading and odometry errors are kept (F8).
   covariance.topLeftCorner<2, 2>() += innovation.value * innovation.value.transpose();
-  filter_.set_state(Filter::State::Zero(), covariance);
+  filter_.set_state(ErrorState::Zero(), covariance);
   apply(innovation);
   run_.reset();
   detector_.reset();
@@ -286,24 +296,23 @@ void ComplementaryEkf::restart_position(const Innovation& innovation) {
 void ComplementaryEkf::close() {
   filter_.close_bias();
   is_open_ = false;
-  memory_.clear();
+  insignificant_ = 0;
   run_.reset();
   detector_.reset();
 }
 
 void ComplementaryEkf::apply(const Innovation& innovation) {
   filter_.correct(innovation.value - innovation.observation * filter_.bias_free_state(), innovation.observation,
-                  kBiasObservation, innovation.white);
+                  kBiasObservation, innovation.noise);
   feed_back();
 }
 
 void ComplementaryEkf::feed_back() {
-  const Filter::State error = filter_.compensated_state();
+  const ErrorState error = filter_.compensated_state();
   pose_ = {pose_.x + error(0), pose_.y + error(1), wrap_angle(pose_.yaw + error(2))};
   errors_.speed_scale += error(3);
   errors_.yaw_rate_bias_radps += error(4);
   errors_.yaw_rate_scale += error(5);
-  colour_ += error.tail<2>();
   filter_.shift_origin(error);
 }
 

@@ -5,6 +5,7 @@
 
 #include <CLI/CLI.hpp>
 #include <atomic>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <exception>
@@ -13,7 +14,6 @@
 #include <iostream>
 #include <mutex>
 #include <nlohmann/json.hpp>
-#include <optional>
 #include <sstream>
 #include <thread>
 
@@ -31,9 +31,7 @@ using namespace urban_gnss;
 
 namespace {
 
-constexpr std::array<const char*, 3> kPhases{"before", "between", "after"};
-/// A bias that stays insignificant for so long has ended.
-constexpr Stamp kSettled = std::chrono::seconds(10);
+constexpr std::array<const char*, 3> kPhases{"before", "between", "after"};  ///< as phase_of counts
 
 struct Options {
   std::vector<std::string> scenarios{"building_pass", "open_sky"};
@@ -45,26 +43,6 @@ struct Options {
   std::string plots;
   int jobs = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
 };
-
-/// Index into kPhases. Where there are no buildings, everything is before them.
-std::size_t phase_of(const BiasRun& run, Stamp stamp) {
-  if (!run.between || stamp < run.between->first) return 0;
-  return stamp <= run.between->second ? 1 : 2;
-}
-
-/// s from leaving the buildings until the bias is insignificant and stays so for kSettled; nothing where it does not.
-std::optional<double> settling_time_s(const BiasRun& run, const BiasContestantRun& contestant) {
-  if (!run.between || contestant.biases.empty()) return std::nullopt;
-  const Stamp left = run.between->second;
-  Stamp since = left;
-  for (const BiasEstimate& bias : contestant.biases) {
-    if (bias.stamp < left) continue;
-    if (bias.stamp - since >= kSettled) return to_seconds(since - left);
-    if (bias.in_shadow) since = bias.stamp;
-  }
-  if (contestant.biases.back().stamp - since < kSettled) return std::nullopt;
-  return to_seconds(since - left);
-}
 
 nlohmann::json contestant_json(const std::vector<BiasRun>& runs, std::size_t contestant) {
   std::array<std::vector<double>, kPhases.size()> position;
@@ -98,7 +76,7 @@ nlohmann::json contestant_json(const std::vector<BiasRun>& runs, std::size_t con
       alarms[phase] += is_doubted && !was_doubted ? 1.0 : 0.0;
       was_doubted = is_doubted;
     }
-    const auto settled = settling_time_s(run, of_run);
+    const auto settled = settling_time_s(run, of_run.biases);
     json["settling_time_by_seed_s"].push_back(settled ? nlohmann::json(*settled) : nlohmann::json());
   }
   for (std::size_t phase = 0; phase < kPhases.size(); ++phase) {

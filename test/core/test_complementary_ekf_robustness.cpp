@@ -243,8 +243,6 @@ std::string trace(const std::string& yaml) {
     drive.run(30.0, note);
     drive.bias = [](double since) { return Eigen::Vector2d(0.2 * since, 0.0); };
     drive.run(40.0, note);
-    drive.bias = [](double since) { return Eigen::Vector2d(20.0 * std::exp(-since / 20.0), 0.0); };
-    drive.run(120.0, note);
     drive.bias = far_away;
     drive.run(12.0, note);
     drive.run_without_fixes(3.0);
@@ -279,12 +277,14 @@ TEST(ComplementaryEkfParameters, EachHasAnEffect) {
       other = "dead_reckoning";
     } else if (value == "true" || value == "false") {
       other = value == "true" ? "false" : "true";
-    } else if (name == "inert_window") {
+    } else if (name == "close_count" || name == "inert_window") {
       other = std::to_string(std::stoi(value) / 2);
     } else if (name == "gate_probability" || name == "close_probability") {
       other = "0.6";
     } else if (name == "inert_probability") {
       other = "0.09";
+    } else if (name == "fix_noise_max_inflation") {
+      other = "1.01";
     } else {
       other = std::to_string(0.5 * std::stod(value));
     }
@@ -294,8 +294,7 @@ TEST(ComplementaryEkfParameters, EachHasAnEffect) {
 
 TEST(ComplementaryEkfParameters, BadOnesAreNamed) {
   const YAML::Node map = YAML::Load(
-      "{mode: bold, gate_probability: 1.0, close_time: -1.0, fix_bias_time: 0.0, lockout_policy: never, "
-      "odom_scale_walk: "
+      "{mode: bold, gate_probability: 1.0, close_count: 0, fix_bias_time: 0.0, lockout_policy: never, odom_scale_walk: "
       "-1.0, fix_bias_tim: 3.0}");
   ComplementaryEkfParameters parameters;
   ParameterReader reader(map);

@@ -2,7 +2,7 @@
 
 #include <Eigen/Core>
 #include <array>
-#include <functional>
+#include <chrono>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -48,6 +48,14 @@ struct BiasRun {
   std::optional<std::pair<Stamp, Stamp>> between;
   std::array<BiasContestantRun, kBiasContestants.size()> contestants;
 };
+
+/// 0 before the buildings, 1 between them, 2 after. Where there are none, everything is before.
+std::size_t phase_of(const BiasRun& run, Stamp stamp);
+
+/// s from leaving the buildings until the bias is insignificant (its filter closed, or b' M^-1 b below close_probability's
+/// quantile) and stays so for kSettled; nothing where it does not, or where there are no buildings.
+std::optional<double> settling_time_s(const BiasRun& run, const std::vector<BiasEstimate>& biases);
+inline constexpr Stamp kSettled = std::chrono::seconds(10);
 
 /// Drives the scenario with a filter of each mode. The filters start from fixes and motion and see nothing of the
 /// truth, the withheld one aside. Throws what CitySimulator throws.

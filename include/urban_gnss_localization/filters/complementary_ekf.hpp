@@ -1,6 +1,5 @@
 #pragma once
 
-#include <deque>
 #include <optional>
 #include <vector>
 
@@ -15,9 +14,9 @@
 namespace urban_gnss {
 
 enum class ComplementaryMode {
-  kStandard,     ///< every fix is used as it is: the paper's complementary integration without compensation
-  kGated,        ///< a fix that is taken for biased is rejected
-  kCompensated,  ///< the paper's: its bias is estimated
+  kStandard,     ///< the paper's conventional filter (section 2.3): every fix as it is, with its declared covariance
+  kGated,        ///< the same, but a fix whose NIS is above its quantile is rejected
+  kCompensated,  ///< the paper's: its bias is estimated; the noise of the fixes is taken as they show it
 };
 EnumNames<ComplementaryMode> enum_names(ComplementaryMode);
 
@@ -30,16 +29,15 @@ EnumNames<LockoutPolicy> enum_names(LockoutPolicy);
 
 struct ComplementaryEkfParameters {
   ComplementaryMode mode{ComplementaryMode::kCompensated};
-  double fix_bias_sigma{12.0};     ///< m per axis, M0: the bias when its filter opens
-  double fix_bias_time{20.0};      ///< s, time after which a bias has faded; with fix_bias_sigma this gives Q_b
+  bool adapt_every_mode{false};    ///< standard and gated too take the noise as the fixes show it and (gated) find ramps
+  double fix_bias_sigma{20.0};     ///< m per axis, M0: the bias when its filter opens
+  double fix_bias_time{30.0};      ///< s, time after which a bias has faded; with fix_bias_sigma this gives Q_b
   double close_probability{0.95};  ///< a bias inside this quantile is insignificant
-  double close_time{10.0};         ///< s of nothing but an insignificant bias after which the filter closes
-  double bias_onset_time{20.0};    ///< s before its detection at which a bias is taken to have begun
+  int close_count{5};              ///< count of fixes in a row with an insignificant bias after which the filter closes
   double detection_horizon{
       10.0};  ///< s of odometry after which the tests' covariance grows no more while fixes are doubted
   /// s, correlation time of a fix's error while the robot stands: reflections change little then (F34)
   double parked_correlation_time{150.0};
-  double fix_correlation_time{30.0};  ///< s, correlation time of the coloured part of a fix's error while it moves
   LockoutPolicy lockout_policy{LockoutPolicy::kAutomatic};
   double lockout_timeout{20.0};     ///< s of nothing but rejected fixes
   double bias_open_timeout{120.0};  ///< s of an open bias filter
@@ -51,14 +49,13 @@ struct ComplementaryEkfParameters {
   template <class V>
   void visit(V& v) {
     v("mode", mode);
+    v("adapt_every_mode", adapt_every_mode);
     v("fix_bias_sigma", fix_bias_sigma, positive());
     v("fix_bias_time", fix_bias_time, positive());
     v("close_probability", close_probability, between(0.01, 0.999999));
-    v("close_time", close_time, non_negative());
-    v("bias_onset_time", bias_onset_time, non_negative());
+    v("close_count", close_count, between(1, 10000));
     v("detection_horizon", detection_horizon, non_negative());
-    v("parked_correlation_time", parked_correlation_time, positive());
-    v("fix_correlation_time", fix_correlation_time, positive());
+    v("parked_correlation_time", parked_correlation_time, non_negative());
     v("lockout_policy", lockout_policy);
     v("lockout_timeout", lockout_timeout, positive());
     v("bias_open_timeout", bias_open_timeout, positive());
@@ -78,12 +75,8 @@ struct ComplementaryEkfParameters {
 ///   2. where it is taken for biased, open the bias filter: b = 0, covariance M0 (TwoStageFilter);
 ///   3. while open, let the bias walk, correct both stages, feed back the compensated error;
 ///   4. where the very next fix speaks for no bias, it was a false alarm: go on as if it had not been;
-///   5. close it when the bias has been insignificant for some time, or a fix agrees with no bias again at once.
-/// A bias that builds up slowly has been fused for a while when it is detected. So 2. goes back: the state of
-/// bias_onset_time ago is restored, its bias filter opened, and odometry and fixes since then are used once more (F5).
-/// The error states are the pose, where estimate_odometry_errors what the odometry is wrong by, and the coloured part
-/// of the fix's error of nominal size (FixNoiseMonitor; compensated mode only: the others take all of it for white, as
-/// the paper's conventional filter does).
+///   5. close it when the bias has been insignificant for some fixes, or a fix agrees with no bias again at once.
+/// The error states are the pose and, where estimate_odometry_errors, what the odometry is wrong by.
 ///
 /// A heading that is wrong by radians is beyond a linearisation: started without a heading, the position follows the
 /// fixes, and the filter starts once HeadingInitializer has found one.
@@ -110,14 +103,11 @@ class ComplementaryEkf : public Localizer {
   Pose2 correction() const { return compose(pose_, inverse(dead_reckoned_)); }
   const OdometryErrors& odometry_errors() const { return errors_; }
   /// Of the error states, with the bias's share.
-  ErrorCovariance error_covariance() const {
-    return filter_.compensated_covariance().topLeftCorner<kErrorStates, kErrorStates>();
-  }
+  ErrorCovariance error_covariance() const { return filter_.compensated_covariance(); }
 
   bool is_bias_open() const { return is_open_; }
   Eigen::Vector2d bias() const { return filter_.bias(); }
   Eigen::Matrix2d bias_covariance() const { return filter_.bias_covariance(); }
-  FixNoise fix_noise() const { return noise_of_fix(); }
   /// Whether the gate cannot find anything, as the NIS runs far below its expectation (F4).
   bool is_gate_inert() const { return is_inert_; }
   /// smallest_detectable_jump (m) at the last fix; 0 before the first.
@@ -127,14 +117,14 @@ class ComplementaryEkf : public Localizer {
   std::vector<BiasEstimate> take_bias_estimates();
 
  private:
-  static constexpr int kStates = kErrorStates + 2;  ///< the last two: the fix's coloured error (m)
-  using Filter = TwoStageFilter<kStates, 2, 2>;
+  using Filter = TwoStageFilter<kErrorStates, 2, 2>;
 
   /// One fix, linearised about the pose.
   struct Innovation {
     Eigen::Vector2d value;  ///< m, fix minus predicted antenna, without the bias
     Filter::Observation observation;
-    Eigen::Matrix2d white;  ///< m^2
+    Eigen::Matrix2d declared;  ///< m^2
+    Eigen::Matrix2d noise;     ///< m^2, as estimation believes it
     double time_s;
   };
   /// Since when fixes have been doubted without a break.
@@ -145,47 +135,16 @@ class ComplementaryEkf : public Localizer {
     bool is_frozen;
   };
 
-  /// What moves and fixes change and going back has to restore.
-  struct Snapshot {
-    Pose2 pose;
-    OdometryErrors errors;
-    Filter filter{Filter::State::Zero(), Filter::StateCovariance::Zero()};
-    Eigen::Vector2d colour;
-    double moved_since_fix_m;
-    double elapsed_since_fix_s;
-    double last_fix_s;
-    bool had_fix;
-  };
-  struct Step {
-    Twist2 twist;
-    double duration_s;
-  };
-  /// A fix that was used as unbiased, what it led to, and the odometry since.
-  struct Memory {
-    FixMeasurement fix;
-    Snapshot after;
-    std::vector<Step> steps;
-  };
-  Snapshot snapshot() const;
-  void restore(const Snapshot& from);
-  DeadReckoningStep step(const Twist2& twist, double duration_s);
-  /// Moves the coloured error to the fix and linearises about the pose.
-  Innovation innovate(const FixMeasurement& fix);
-  void remember(const FixMeasurement& fix);
-  /// Opens the bias filter; where a state of before the bias began is remembered, there, and uses odometry and fixes
-  /// since then once more, the fix at hand excepted. Whether it went back.
-  bool open_at_onset(double now_s, const Eigen::Matrix2d& m0);
-  /// Lets the bias change up to the time of a fix.
-  void move_bias(double time_s);
-  FixNoise noise_of_fix() const;
-  /// Lets the coloured error change up to a fix of this declared covariance (m^2).
-  void move_colour(const FixMeasurement& fix, const FixNoise& noise);
+  /// Whether more is believed of the fixes than they declare: their noise as they scatter, slow drifts.
+  bool is_adaptive() const;
+  /// Factor on the declared covariance, as the fixes scatter and as the robot stands.
+  double noise_inflation() const;
   /// Without a heading: takes the fix for the position and for the search. True where the heading was found.
   bool search_heading(const FixMeasurement& fix, const Innovation& innovation);
-  void decide(const FixMeasurement& fix, const Innovation& innovation, FixVerdict& verdict);
+  void decide(const Innovation& innovation, FixVerdict& verdict);
   void decide_compensated(const Innovation& innovation, const BiasDetection& detection, FixVerdict& verdict);
-  void decide_open(const FixMeasurement& fix, const Innovation& innovation, FixVerdict& verdict);
-  void open_or_reject(const FixMeasurement& fix, const Innovation& innovation, FixVerdict& verdict);
+  void decide_open(const Innovation& innovation, FixVerdict& verdict);
+  void open_or_reject(const Innovation& innovation, FixVerdict& verdict);
   void reject(const Innovation& innovation, FixVerdict& verdict);
   /// Whether the first fix after the opening speaks for no bias; ends the bias filter where it does.
   bool is_false_alarm(const Innovation& innovation, double direct_nis, FixVerdict& verdict);
@@ -210,9 +169,8 @@ class ComplementaryEkf : public Localizer {
   Pose2 dead_reckoned_;
   OdometryErrors errors_;
   /// Of the errors of pose_ and errors_. After each feedback the compensated error is 0.
-  Filter filter_{Filter::State::Zero(), Filter::StateCovariance::Zero()};
-  Eigen::Vector2d colour_{Eigen::Vector2d::Zero()};  ///< m, coloured error of the fixes
-  Eigen::Vector2d path_{Eigen::Vector2d::Zero()};    ///< m, moved since the start, without corrections
+  Filter filter_{ErrorState::Zero(), ErrorCovariance::Zero()};
+  Eigen::Vector2d path_{Eigen::Vector2d::Zero()};  ///< m, moved since the start, without corrections
   double path_variance_m2_{0.0};
 
   bool is_open_{false};
@@ -221,8 +179,7 @@ class ComplementaryEkf : public Localizer {
   bool is_confirmed_{false};  ///< a fix after the opening agreed with the bias
   double last_fix_s_{0.0};
   bool had_fix_{false};
-  double significant_s_{0.0};  ///< when the bias was last significant
-  std::deque<Memory> memory_;
+  int insignificant_{0};
   bool is_inert_{false};
   std::optional<Run> run_;
   std::optional<HeadingInitializer> heading_search_;  ///< while the heading is unknown

@@ -1,34 +1,34 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <optional>
+#include <deque>
 
 #include "urban_gnss_localization/common/parameters.hpp"
 
 namespace urban_gnss {
 
 struct FixNoiseParameters {
-  bool adapt_fix_noise{true};     ///< tell white from coloured errors as the fixes show; false: all of it is white
-  double fix_noise_memory{60.0};  ///< count of fixes that the statistics are averaged over, at least 10
+  bool adapt_fix_noise{true};             ///< enlarge the declared covariance as the fixes show; false: believe it
+  double fix_noise_horizon{20.0};         ///< s apart at which the errors of two fixes are taken for independent
+  double fix_noise_memory{60.0};          ///< count of fixes that the statistics are averaged over
+  double fix_noise_max_inflation{100.0};  ///< most that a covariance is multiplied by
 
   template <class V>
   void visit(V& v) {
     v("adapt_fix_noise", adapt_fix_noise);
-    v("fix_noise_memory", fix_noise_memory, at_least(10.0));
+    v("fix_noise_horizon", fix_noise_horizon, positive());
+    v("fix_noise_memory", fix_noise_memory, at_least(1.0));
+    v("fix_noise_max_inflation", fix_noise_max_inflation, at_least(1.0));
   }
   void check(std::vector<std::string>&) const {}
 };
 
-/// What the error of a fix is made of, as shares of its declared covariance.
-struct FixNoise {
-  double white{1.0};     ///< new with every fix
-  double coloured{0.0};  ///< changes slowly
-};
-
-/// How much of a fix's error is new with every fix, from the fixes against short-horizon odometry: half the mean square
-/// by which neighbours differ beyond what the robot moved, relative to their declared covariance. White errors of the
-/// declared size give 1; what a smoothing receiver leaves is far below, and the rest of its error is there all the
-/// same, only slow. It depends on no estimate of a filter's, so that it cannot talk itself into anything.
+/// How much a fix with a coloured error is worth, from a variogram of the fixes against short-horizon odometry: half
+/// the mean square by which two fixes differ beyond what the robot moved, relative to their declared covariance, for
+/// neighbours (near) and for fixes `fix_noise_horizon` apart (far). White errors of the declared size give 1 and 1. An
+/// error of correlation rho from fix to fix has near = (1 - rho) far; averaging such fixes is worth as much as
+/// averaging white ones whose variance is (1 + rho) / (1 - rho) = (2 far - near) / near times larger. It depends on no
+/// estimate of a filter's, so that it cannot talk itself into anything.
 class FixNoiseMonitor {
  public:
   /// Requires parameters without faults.
@@ -36,14 +36,16 @@ class FixNoiseMonitor {
 
   /// Takes a fix: position (m) and declared covariance (m^2); the dead-reckoned place of the antenna (m, any origin,
   /// same axes) and its accumulated variance (m^2), of which the difference between two fixes counts; the share of the
-  /// distance (1) that heading and scale may be wrong by; time (s), ascending. Nothing is learned from a doubted one.
+  /// distance (1) that heading and scale may be wrong by; time (s), ascending.
   void add(const Eigen::Vector2d& position, const Eigen::Matrix2d& covariance, const Eigen::Vector2d& dead_reckoned,
-           double dead_reckoned_variance_m2, double distance_share, double time_s, bool is_doubted = false);
+           double dead_reckoned_variance_m2, double distance_share, double time_s);
 
   void reset();
 
-  /// Both whole until there are enough fixes. White alone where it is not to adapt.
-  FixNoise noise() const;
+  /// Factor on the declared covariance for estimation, at least 1; 1 until there are enough fixes.
+  double inflation() const;
+  double near() const { return near_.mean; }
+  double far() const { return far_.mean; }
 
  private:
   struct Fix {
@@ -53,11 +55,17 @@ class FixNoiseMonitor {
     double variance_m2;
     double time_s;
   };
+  struct Average {
+    double mean{1.0};
+    double count{0.0};
+    void add(double value, double memory);
+  };
+  static double ratio(const Fix& a, const Fix& b, double distance_share);
 
   FixNoiseParameters parameters_;
-  std::optional<Fix> last_;
-  double near_{1.0};  ///< mean of the neighbours' ratios
-  double count_{0.0};
+  std::deque<Fix> fixes_;
+  Average near_;
+  Average far_;
 };
 
 }  // namespace urban_gnss
