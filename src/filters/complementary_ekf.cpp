@@ -72,7 +72,7 @@ void ComplementaryEkf::move(const Twist2& twist, double duration_s) {
   if (heading_search_) {
     // Which way it went is unknown: the position stays and becomes uncertain by the distance.
     step.noise.topLeftCorner<2, 2>().diagonal().array() += distance * (distance + 2.0 * moved_since_fix_m_);
-    step.transition.topRightCorner<2, kErrorStates - 2>().setZero();
+    step.transition.topRows<2>().rightCols<3>().setZero();
     step.pose.x = pose_.x;
     step.pose.y = pose_.y;
   }
@@ -312,7 +312,6 @@ void ComplementaryEkf::feed_back() {
   pose_ = {pose_.x + error(0), pose_.y + error(1), wrap_angle(pose_.yaw + error(2))};
   errors_.speed_scale += error(3);
   errors_.yaw_rate_bias_radps += error(4);
-  errors_.yaw_rate_scale += error(5);
   filter_.shift_origin(error);
 }
 

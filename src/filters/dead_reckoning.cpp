@@ -23,14 +23,13 @@ DeadReckoningStep dead_reckon(const Pose2& pose, const OdometryErrors& errors, c
   if (p.estimate_odometry_errors) {
     step.noise(3, 3) = square(p.odom_scale_walk) * duration_s;
     step.noise(4, 4) = square(p.odom_yaw_bias_walk) * duration_s;
-    step.noise(5, 5) = square(p.odom_yaw_scale_walk) * duration_s;
   }
   if (is_standstill(measured)) {
     step.pose = pose;
     return step;
   }
   const Twist2 corrected{(1.0 + errors.speed_scale) * measured.speed_mps,
-                         (1.0 + errors.yaw_rate_scale) * measured.yaw_rate_radps + errors.yaw_rate_bias_radps};
+                         measured.yaw_rate_radps + errors.yaw_rate_bias_radps};
   step.pose = move(pose, corrected, duration_s);
 
   const double dx = step.pose.x - pose.x;
@@ -46,7 +45,6 @@ DeadReckoningStep dead_reckon(const Pose2& pose, const OdometryErrors& errors, c
   if (p.estimate_odometry_errors) {
     step.transition.block<3, 1>(0, 3) = k.col(0) * measured.speed_mps * duration_s;
     step.transition.block<3, 1>(0, 4) = k.col(1) * duration_s;
-    step.transition.block<3, 1>(0, 5) = k.col(1) * measured.yaw_rate_radps * duration_s;
   }
   const Eigen::Vector2d sigma_v(square(p.odom_speed_noise * measured.speed_mps) * duration_s,
                                 square(p.odom_yaw_rate_noise * measured.yaw_rate_radps) * duration_s);
@@ -63,7 +61,6 @@ ErrorCovariance initial_error_covariance(const Eigen::Matrix3d& pose_covariance,
   if (p.estimate_odometry_errors) {
     covariance(3, 3) = square(p.odom_scale_sigma);
     covariance(4, 4) = square(p.odom_yaw_bias_sigma);
-    covariance(5, 5) = square(p.odom_yaw_scale_sigma);
   }
   return covariance;
 }

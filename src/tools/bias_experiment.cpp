@@ -4,8 +4,8 @@
 #include "urban_gnss_localization/experiments/bias_experiment.hpp"
 
 #include <CLI/CLI.hpp>
-#include <atomic>
 #include <array>
+#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <exception>

@@ -41,7 +41,6 @@ struct Drive {
     truth.yaw = 0.1 * draw_normal(engine);
     errors.speed_scale = parameters.odometry.odom_scale_sigma * draw_normal(engine);
     errors.yaw_rate_bias_radps = parameters.odometry.odom_yaw_bias_sigma * draw_normal(engine);
-    errors.yaw_rate_scale = parameters.odometry.odom_yaw_scale_sigma * draw_normal(engine);
   }
 
   FixMeasurement make_fix(double since = 0.0) {
@@ -64,7 +63,7 @@ struct Drive {
     filter.move(measured, dt);
     if (is_standstill(measured)) return;
     Twist2 actual{(1.0 + errors.speed_scale) * measured.speed_mps,
-                  (1.0 + errors.yaw_rate_scale) * measured.yaw_rate_radps + errors.yaw_rate_bias_radps};
+                  measured.yaw_rate_radps + errors.yaw_rate_bias_radps};
     actual.speed_mps += p.odom_speed_noise * measured.speed_mps / std::sqrt(dt) * draw_normal(engine);
     actual.yaw_rate_radps += p.odom_yaw_rate_noise * measured.yaw_rate_radps / std::sqrt(dt) * draw_normal(engine);
     truth = move(truth, actual, dt);
@@ -74,7 +73,6 @@ struct Drive {
     if (p.estimate_odometry_errors) {
       errors.speed_scale += p.odom_scale_walk * std::sqrt(dt) * draw_normal(engine);
       errors.yaw_rate_bias_radps += p.odom_yaw_bias_walk * std::sqrt(dt) * draw_normal(engine);
-      errors.yaw_rate_scale += p.odom_yaw_scale_walk * std::sqrt(dt) * draw_normal(engine);
     }
   }
 

@@ -1,9 +1,8 @@
-#include "urban_gnss_localization/experiments/bias_experiment.hpp"
-
 #include <gtest/gtest.h>
 
 #include "city_rig.hpp"
 #include "urban_gnss_localization/evaluation/trajectory_errors.hpp"
+#include "urban_gnss_localization/experiments/bias_experiment.hpp"
 
 namespace urban_gnss {
 namespace {

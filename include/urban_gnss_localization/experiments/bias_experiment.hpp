@@ -52,8 +52,8 @@ struct BiasRun {
 /// 0 before the buildings, 1 between them, 2 after. Where there are none, everything is before.
 std::size_t phase_of(const BiasRun& run, Stamp stamp);
 
-/// s from leaving the buildings until the bias is insignificant (its filter closed, or b' M^-1 b below close_probability's
-/// quantile) and stays so for kSettled; nothing where it does not, or where there are no buildings.
+/// s from leaving the buildings until the bias is insignificant (its filter closed, or b' M^-1 b below
+/// close_probability's quantile) and stays so for kSettled; nothing where it does not, or where there are no buildings.
 std::optional<double> settling_time_s(const BiasRun& run, const std::vector<BiasEstimate>& biases);
 inline constexpr Stamp kSettled = std::chrono::seconds(10);
 

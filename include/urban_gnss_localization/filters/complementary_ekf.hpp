@@ -29,9 +29,9 @@ EnumNames<LockoutPolicy> enum_names(LockoutPolicy);
 
 struct ComplementaryEkfParameters {
   ComplementaryMode mode{ComplementaryMode::kCompensated};
-  bool adapt_every_mode{false};    ///< standard and gated too take the noise as the fixes show it and (gated) find ramps
-  double fix_bias_sigma{20.0};     ///< m per axis, M0: the bias when its filter opens
-  double fix_bias_time{30.0};      ///< s, time after which a bias has faded; with fix_bias_sigma this gives Q_b
+  bool adapt_every_mode{false};  ///< standard and gated too take the noise as the fixes show it and (gated) find ramps
+  double fix_bias_sigma{20.0};   ///< m per axis, M0: the bias when its filter opens
+  double fix_bias_time{30.0};    ///< s, time after which a bias has faded; with fix_bias_sigma this gives Q_b
   double close_probability{0.95};  ///< a bias inside this quantile is insignificant
   int close_count{5};              ///< count of fixes in a row with an insignificant bias after which the filter closes
   double detection_horizon{
@@ -135,7 +135,7 @@ class ComplementaryEkf : public Localizer {
     bool is_frozen;
   };
 
-  /// Whether more is believed of the fixes than they declare: their noise as they scatter, slow drifts.
+  /// Whether the noise of the fixes is taken as they scatter, and slow drifts of them are looked for.
   bool is_adaptive() const;
   /// Factor on the declared covariance, as the fixes scatter and as the robot stands.
   double noise_inflation() const;

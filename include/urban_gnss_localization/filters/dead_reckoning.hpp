@@ -13,13 +13,11 @@ struct DeadReckoningParameters {
   double odom_yaw_rate_noise{0.03};     ///< share of the yaw rate, /sqrt(Hz): diagonal of Sigma_v
   double odom_position_noise{0.05};     ///< m/sqrt(s) per axis, while moving: Sigma_N
   double odom_heading_noise{0.003};     ///< rad/sqrt(s), while moving: Sigma_N
-  bool estimate_odometry_errors{true};  ///< what OdometryErrors holds as states; false: the paper's (x, y, heading)
+  bool estimate_odometry_errors{true};  ///< speed scale and yaw-rate bias as states; false: the paper's (x, y, heading)
   double odom_scale_sigma{0.02};        ///< 1, of the speed scale's error at the start
   double odom_scale_walk{2e-4};         ///< 1/sqrt(s), how fast it changes
   double odom_yaw_bias_sigma{0.005};    ///< rad/s, of the yaw rate's bias at the start
   double odom_yaw_bias_walk{3e-5};      ///< rad/s/sqrt(s), how fast it changes
-  double odom_yaw_scale_sigma{0.01};    ///< 1, of the yaw rate's scale error at the start
-  double odom_yaw_scale_walk{1e-4};     ///< 1/sqrt(s), how fast it changes
 
   template <class V>
   void visit(V& v) {
@@ -32,22 +30,18 @@ struct DeadReckoningParameters {
     v("odom_scale_walk", odom_scale_walk, non_negative());
     v("odom_yaw_bias_sigma", odom_yaw_bias_sigma, non_negative());
     v("odom_yaw_bias_walk", odom_yaw_bias_walk, non_negative());
-    v("odom_yaw_scale_sigma", odom_yaw_scale_sigma, non_negative());
-    v("odom_yaw_scale_walk", odom_yaw_scale_walk, non_negative());
   }
   void check(std::vector<std::string>&) const {}
 };
 
-/// What the odometry is wrong by: true speed = (1 + speed_scale) measured,
-/// true yaw rate = (1 + yaw_rate_scale) measured + yaw_rate_bias.
+/// What the odometry is wrong by: true speed = (1 + speed_scale) measured, true yaw rate = measured + yaw_rate_bias.
 struct OdometryErrors {
   double speed_scale{0.0};          ///< 1
   double yaw_rate_bias_radps{0.0};  ///< rad/s
-  double yaw_rate_scale{0.0};       ///< 1
 };
 
-/// Order of the error states: x (m), y (m), yaw (rad), speed scale (1), yaw-rate bias (rad/s), yaw-rate scale (1).
-inline constexpr int kErrorStates = 6;
+/// Order of the error states: x (m), y (m), yaw (rad), speed scale (1), yaw-rate bias (rad/s).
+inline constexpr int kErrorStates = 5;
 using ErrorState = Eigen::Matrix<double, kErrorStates, 1>;
 using ErrorCovariance = Eigen::Matrix<double, kErrorStates, kErrorStates>;
 
