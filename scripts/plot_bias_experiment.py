@@ -19,7 +19,8 @@ import report_common as common  # noqa: E402
 from report_common import plt  # noqa: E402
 
 PHASES = ("before", "between", "after")
-FILTERS = ("standard", "gated", "compensated", "withheld")
+FILTERS = ("standard", "gated", "standard_adapted", "gated_adapted", "compensated", "withheld")
+# Those that are drawn.
 COLOURS = {"standard": "#d55e00", "gated": "#e69f00", "compensated": "#0072b2", "withheld": "#8a8a8a"}
 
 
@@ -40,7 +41,7 @@ def draw(directory, path, seed):
     truth = read(directory, "truth", ("t", "x", "y", "phase"))
     fixes = read(directory, "fixes", ("t", "error_x", "error_y"))
     bias = read(directory, "bias_compensated", ("t", "bias_x", "bias_y", "sigma_x", "sigma_y", "doubted"))
-    estimates = {name: read(directory, "estimate_" + name, ("t", "x", "y", "error_m", "sigma_m")) for name in FILTERS}
+    estimates = {name: read(directory, "estimate_" + name, ("t", "x", "y", "error_m", "sigma_m")) for name in COLOURS}
 
     figure = plt.figure(figsize=(11, 12))
     grid = figure.add_gridspec(4, 1, height_ratios=(1.5, 1.0, 0.9, 0.9), hspace=0.32)
@@ -49,7 +50,7 @@ def draw(directory, path, seed):
     at = [np.interp(fixes["t"], truth["t"], truth[axis]) for axis in ("x", "y")]
     track.plot(at[0] + fixes["error_x"], at[1] + fixes["error_y"], ".", markersize=2.5, color=common.FIX_COLOUR,
                label="fix")
-    for name in FILTERS:
+    for name in COLOURS:
         track.plot(estimates[name]["x"], estimates[name]["y"], color=COLOURS[name], linewidth=1.2, label=name)
     track.plot(truth["x"], truth["y"], color=common.TRUTH_COLOUR, linewidth=1.0, label="truth")
     track.set_aspect("equal", adjustable="datalim")
@@ -60,12 +61,12 @@ def draw(directory, path, seed):
     shade_between(error, truth)
     error.plot(fixes["t"], np.hypot(fixes["error_x"], fixes["error_y"]), ".", markersize=2.0,
                color=common.FIX_COLOUR, label="fix")
-    for name in FILTERS:
+    for name in COLOURS:
         error.plot(estimates[name]["t"], estimates[name]["error_m"], color=COLOURS[name], linewidth=1.2, label=name)
     error.plot(estimates["compensated"]["t"], 2.0 * estimates["compensated"]["sigma_m"], ":",
                color=COLOURS["compensated"], linewidth=1.0, label="its 2 sigma")
     top = max(np.nanmax(np.hypot(fixes["error_x"], fixes["error_y"])),
-              max(np.nanpercentile(estimates[name]["error_m"], 99.0) for name in FILTERS))
+              max(np.nanpercentile(estimates[name]["error_m"], 99.0) for name in COLOURS))
     error.set_ylim(0.0, 1.1 * top)
     error.set_ylabel("position error, m")
 
@@ -90,6 +91,16 @@ def draw(directory, path, seed):
     common.save_figure(figure, path)
 
 
+def settling(row):
+    """How long the bias took to become insignificant in the slowest drive, and in how many it did not."""
+    times = row["settling_time_by_seed_s"]
+    settled = [time for time in times if time is not None]
+    if not settled:
+        return ""
+    left = len(times) - len(settled)
+    return "at most {:.0f}".format(max(settled)) + (", {} not".format(left) if left else "")
+
+
 def table_of(scenario):
     """The errors of one scenario as a table of Markdown."""
     lines = ["| | mean error before / between / after, m | max between, m | NEES (3) before / between / after "
@@ -99,12 +110,11 @@ def table_of(scenario):
     for name, row in rows:
         means = " / ".join(common.format_number(common.number(row, phase, "position_mean_m")) for phase in PHASES)
         nees = " / ".join(common.format_number(common.number(row, phase, "nees_mean"), 1) for phase in PHASES)
-        settled = [value for value in row.get("settling_time_by_seed_s", []) if value is not None]
         lines.append("| {} | {} | {} | {} | {} | {} |".format(
             name, means, common.format_number(common.number(row, "between", "position_max_m"), 1),
             nees if name != "fixes" else "", common.format_number(
                 100.0 * common.number(row, "between", "doubted_share"), 1) if name != "fixes" else "",
-            "at most {:.0f}".format(max(settled)) if settled and name == "compensated" else ""))
+            settling(row) if name == "compensated" else ""))
     return "\n".join(lines)
 
 

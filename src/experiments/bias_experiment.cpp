@@ -25,6 +25,7 @@ class Contestant {
              BiasContestantRun& run)
       : is_withheld_(contestant.is_withheld), run_(run) {
     conditions.filter.mode = contestant.mode;
+    conditions.filter.adapt_every_mode = contestant.is_adapted;
     auto filter = std::make_unique<ComplementaryEkf>(conditions.filter);
     filter_ = filter.get();
     pipeline_ = std::make_unique<LocalizationPipeline>(conditions.localization, std::move(filter));

@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 #include <limits>
 #include <stdexcept>
+#include <utility>
 
 #include "matchers.hpp"
 #include "urban_gnss_localization/filters/bias_detector.hpp"
@@ -33,8 +34,8 @@ TEST(BiasDetector, ThresholdIsTheQuantileForTwoDimensions) {
 
 TEST(BiasDetector, FalseAlarmsComeAtTheirRate) {
   RandomEngine engine = make_engine(1);
-  constexpr int kFixes = 100000;
-  for (const double probability : {0.95, 0.99}) {
+  constexpr int kFixes = 4000000;
+  for (const auto& [probability, fixes_per_ramp] : {std::pair(0.99, 7800.0), std::pair(0.999999, 4630.0)}) {
     BiasDetectorParameters parameters;
     parameters.gate_probability = probability;
     BiasDetector detector(parameters);
@@ -47,7 +48,7 @@ TEST(BiasDetector, FalseAlarmsComeAtTheirRate) {
     }
     const double expected = kFixes * (1.0 - probability);
     EXPECT_NEAR(jumps, expected, 4.5 * std::sqrt(expected)) << probability;
-    EXPECT_LT(ramps, 2 * kFixes / 4800) << probability;
+    EXPECT_NEAR(ramps * fixes_per_ramp / kFixes, 1.0, 0.15) << probability;
   }
 }
 

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include "city_rig.hpp"
+#include "matchers.hpp"
 #include "urban_gnss_localization/evaluation/trajectory_errors.hpp"
 #include "urban_gnss_localization/experiments/bias_experiment.hpp"
 
@@ -78,7 +79,7 @@ TEST(BiasExperiment, EveryFilterGetsTheSameDrive) {
       if (kBiasContestants[i].is_withheld) EXPECT_LT(bias.stamp, run.between->first);
     }
   }
-  EXPECT_LT(run.contestants[3].biases.size() + 10, run.contestants[0].biases.size()) << "withheld";
+  EXPECT_LT(run.contestants.back().biases.size() + 10, run.contestants[0].biases.size()) << "withheld";
 }
 
 TEST(BiasExperiment, TheSameSeedGivesTheSameRun) {
@@ -89,7 +90,7 @@ TEST(BiasExperiment, TheSameSeedGivesTheSameRun) {
   for (std::size_t i = 0; i < kBiasContestants.size(); ++i) {
     ASSERT_EQ(first.contestants[i].estimate.size(), second.contestants[i].estimate.size());
     ASSERT_FALSE(first.contestants[i].estimate.empty());
-    EXPECT_TRUE(first.contestants[i].estimate.back().pose == second.contestants[i].estimate.back().pose);
+    EXPECT_TRUE(near(first.contestants[i].estimate.back().pose, second.contestants[i].estimate.back().pose, 0.0));
     EXPECT_EQ(first.contestants[i].biases.size(), first.contestants[0].biases.size()) << "nothing is withheld";
   }
 }

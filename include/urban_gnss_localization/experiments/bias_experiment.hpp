@@ -16,7 +16,7 @@ namespace urban_gnss {
 
 /// What the comparison of Kim et al., figure 6, depends on, the scenario aside.
 struct BiasExperimentConditions {
-  ComplementaryEkfParameters filter;    ///< the mode is replaced
+  ComplementaryEkfParameters filter;    ///< mode and adapt_every_mode are replaced
   LocalizationParameters localization;  ///< datum and antenna are replaced by the scenario's
 };
 
@@ -24,15 +24,18 @@ struct BiasExperimentConditions {
 struct BiasContestant {
   const char* name;
   ComplementaryMode mode;
+  bool is_adapted;  ///< adapt_every_mode: a conventional filter that is told of the noise what compensated is
   /// An oracle: it is not given the fixes between the buildings nor those after them that are off by more than
   /// kRecovered_m, so that it shows what the odometry alone can do there.
   bool is_withheld;
 };
-inline constexpr std::array<BiasContestant, 4> kBiasContestants{
-    {{"standard", ComplementaryMode::kStandard, false},
-     {"gated", ComplementaryMode::kGated, false},
-     {"compensated", ComplementaryMode::kCompensated, false},
-     {"withheld", ComplementaryMode::kStandard, true}}};
+inline constexpr std::array<BiasContestant, 6> kBiasContestants{
+    {{"standard", ComplementaryMode::kStandard, false, false},
+     {"gated", ComplementaryMode::kGated, false, false},
+     {"standard_adapted", ComplementaryMode::kStandard, true, false},
+     {"gated_adapted", ComplementaryMode::kGated, true, false},
+     {"compensated", ComplementaryMode::kCompensated, false, false},
+     {"withheld", ComplementaryMode::kStandard, false, true}}};
 inline constexpr double kRecovered_m = 3.0;
 
 struct BiasContestantRun {
