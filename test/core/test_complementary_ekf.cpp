@@ -120,6 +120,28 @@ TEST(ComplementaryEkf, CovarianceIsHonestInTheOpen) {
   }
 }
 
+// Under the open sky, with white errors as declared, compensation must not cost anything.
+TEST(ComplementaryEkf, CompensatedEqualsStandardInTheOpen) {
+  const auto mean_error = [](const char* mode) {
+    double sum = 0.0;
+    int count = 0;
+    for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+      Drive drive(seed, std::string("{mode: ") + mode + "}");
+      drive.start_with_errors();
+      drive.run(600.0, [&](const FixMeasurement&) {
+        sum += drive.error_m();
+        ++count;
+      });
+    }
+    return sum / count;
+  };
+  const double standard = mean_error("standard");
+  const double compensated = mean_error("compensated");
+  RecordProperty("standard", std::to_string(standard));
+  RecordProperty("compensated", std::to_string(compensated));
+  EXPECT_NEAR(compensated / standard, 1.0, 0.01);
+}
+
 TEST(ComplementaryEkf, FalseAlarmsComeAtTheirRate) {
   Drive drive(7, "{}", 5.0);
   int tested = 0;
