@@ -13,8 +13,6 @@ constexpr double kMostOfOnePair = 9.0;
 constexpr double kLeastPairs = 10.0;
 /// Below this the receiver repeats itself; guards the division.
 constexpr double kLeastNear = 1e-4;
-/// White errors, as declared, look as if they were worth up to this much less, by chance.
-constexpr double kLeastInflation = 2.0;
 
 }  // namespace
 
@@ -60,7 +58,7 @@ double FixNoiseMonitor::inflation() const {
   if (!parameters_.adapt_fix_noise || near_.count < kLeastPairs || far_.count < kLeastPairs) return 1.0;
   const double near = std::max(near_.mean, kLeastNear);
   const double factor = far_.mean * std::max(1.0, (2.0 * far_.mean - near) / near);
-  return factor < kLeastInflation ? 1.0 : std::min(factor, parameters_.fix_noise_max_inflation);
+  return std::clamp(factor, 1.0, parameters_.fix_noise_max_inflation);
 }
 
 }  // namespace urban_gnss

@@ -42,7 +42,7 @@ class FixNoiseMonitor {
 
   void reset();
 
-  /// Factor on the declared covariance for estimation: 1 until there are enough fixes and while it may be chance.
+  /// Factor on the declared covariance for estimation, at least 1; 1 until there are enough fixes.
   double inflation() const;
   double near() const { return near_.mean; }
   double far() const { return far_.mean; }
