@@ -67,6 +67,25 @@ TEST(BiasDetector, SlowRampIsFound) {
   EXPECT_LE(found, 25);
 }
 
+// The mean count of fixes until an innovation with this mean (sigma) is found, by either test.
+TEST(BiasDetector, SteadyBiasIsFoundSoon) {
+  RandomEngine engine = make_engine(3);
+  constexpr int kRuns = 5000;
+  for (const auto& [mean, expected] :
+       {std::pair(0.75, 21.1), std::pair(1.0, 12.7), std::pair(1.5, 6.6), std::pair(2.0, 3.9)}) {
+    double fixes = 0.0;
+    for (int run = 0; run < kRuns; ++run) {
+      BiasDetector detector({});
+      BiasDetection detection;
+      while (!detection.is_biased()) {
+        detection = detector.test(draw(isotropic(1.0), engine) + Eigen::Vector2d(mean, 0.0), isotropic(1.0));
+        fixes += 1.0;
+      }
+    }
+    EXPECT_NEAR(fixes / kRuns, expected, 0.05 * expected) << mean;
+  }
+}
+
 TEST(BiasDetector, SpikeIsNoRamp) {
   BiasDetector detector({});
   const BiasDetection detection = detector.test({1e6, 0.0}, Eigen::Matrix2d::Identity());
