@@ -186,7 +186,7 @@ void write_series(const fs::path& directory, const BiasRun& run) {
 
 void run_all(const Options& options, const std::string& command) {
   BiasExperimentConditions conditions;
-  read_overrides("--set", options.overrides, conditions.filter, conditions.localization);
+  read_overrides("--set", {}, options.overrides, conditions.filter, conditions.localization);
   const auto seeds = static_cast<std::size_t>(options.seeds);
   const std::size_t total = options.scenarios.size() * seeds;
   std::vector<std::vector<BiasRun>> results(options.scenarios.size(), std::vector<BiasRun>(seeds));

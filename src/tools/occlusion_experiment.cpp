@@ -47,8 +47,8 @@ struct Options {
 
 OcclusionExperimentConditions read_conditions(const Options& options) {
   OcclusionExperimentConditions conditions;
-  read_overrides("--set", options.occlusion_overrides, conditions.occlusion);
-  read_overrides("--ukf-set", options.ukf_overrides, conditions.ukf, conditions.motion, conditions.localization);
+  read_overrides("--set", {}, options.occlusion_overrides, conditions.occlusion);
+  read_overrides("--ukf-set", {}, options.ukf_overrides, conditions.ukf, conditions.motion, conditions.localization);
   conditions.cloud_every = options.cloud_every;
   return conditions;
 }
