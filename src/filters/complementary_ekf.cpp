@@ -130,7 +130,12 @@ FixVerdict ComplementaryEkf::correct(const FixMeasurement& fix) {
   return verdict;
 }
 
+bool ComplementaryEkf::is_adaptive() const {
+  return parameters_.adapt_every_mode || parameters_.mode == ComplementaryMode::kCompensated;
+}
+
 double ComplementaryEkf::noise_inflation() const {
+  if (!is_adaptive()) return 1.0;
   const double inflation = noise_monitor_.inflation();
   const bool is_parked = elapsed_since_fix_s_ > 0.0 && moved_since_fix_m_ < kParked_mps * elapsed_since_fix_s_;
   if (!is_parked) return inflation;
@@ -168,7 +173,8 @@ void ComplementaryEkf::decide(const Innovation& innovation, FixVerdict& verdict)
   const BiasDetection detection = detector_.test(innovation.value, covariance);
   verdict.nis = detection.nis;
   is_inert_ = detection.is_inert;
-  if (parameters_.mode == ComplementaryMode::kStandard || !detection.is_biased()) {
+  const bool is_biased = is_adaptive() ? detection.is_biased() : detection.is_jump;
+  if (parameters_.mode == ComplementaryMode::kStandard || !is_biased) {
     run_.reset();
     apply(innovation);
     if (is_inert_) verdict.reason = "gate inert: the fixes scatter far less than their covariance says";
@@ -339,6 +345,8 @@ PoseEstimate ComplementaryEkf::estimate() const {
 LocalizerHealth ComplementaryEkf::health() const {
   LocalizerHealth health;
   health.heading_sigma_rad = std::sqrt(filter_.compensated_covariance()(2, 2));
+  health.bias_radius_m = bias().norm();
+  health.is_gate_inert = is_inert_;
   return health;
 }
 

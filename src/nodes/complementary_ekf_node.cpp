@@ -1,7 +1,9 @@
 // The complementary filter of Kim et al. as a node. Parameters: LocalizerNodeParameters and ComplementaryEkfParameters;
 // config/complementary_ekf.yaml documents the latter. Beside what every localizer publishes: gps/bias and
-// gps/bias_markers.
+// gps/bias_markers. The mode can be changed by dynamic_reconfigure.
 
+#include <dynamic_reconfigure/server.h>
+#include <urban_gnss_localization/ComplementaryEkfConfig.h>
 #include <visualization_msgs/MarkerArray.h>
 
 #include "urban_gnss_localization/filters/complementary_ekf.hpp"
@@ -25,9 +27,26 @@ class ComplementaryEkfNode {
     filter_ = localizer.get();
     shell_ = std::make_unique<LocalizerNode>(node, private_node, shell_parameters_, std::move(localizer),
                                              [this](const LocalizationOutput&) { publish_biases(); });
+    private_node.setParam("mode", enum_name(filter.mode));  // the server starts from what is there
+    reconfigure_server_ = std::make_unique<ReconfigureServer>(private_node);
+    reconfigure_server_->setCallback(
+        [this](urban_gnss_localization::ComplementaryEkfConfig& config, std::uint32_t) { reconfigure(config); });
   }
 
  private:
+  using ReconfigureServer = dynamic_reconfigure::Server<urban_gnss_localization::ComplementaryEkfConfig>;
+
+  void reconfigure(urban_gnss_localization::ComplementaryEkfConfig& config) {
+    for (const auto& [name, mode] : enum_names(ComplementaryMode())) {
+      if (config.mode != name) continue;
+      if (config.mode != filter_->mode()) ROS_INFO_STREAM("mode: " << config.mode);
+      filter_->set_mode(mode);
+      return;
+    }
+    ROS_ERROR_STREAM("mode: there is no '" << config.mode << "'; it stays " << filter_->mode());
+    config.mode = filter_->mode();
+  }
+
   void publish_biases() {
     for (const BiasEstimate& bias : filter_->take_bias_estimates()) {
       bias_publisher_.publish(to_message(bias, shell_parameters_.frames.map));
@@ -46,6 +65,7 @@ class ComplementaryEkfNode {
   ros::Publisher marker_publisher_;
   ComplementaryEkf* filter_{nullptr};  ///< owned by the shell's pipeline
   std::unique_ptr<LocalizerNode> shell_;
+  std::unique_ptr<ReconfigureServer> reconfigure_server_;
 };
 
 }  // namespace

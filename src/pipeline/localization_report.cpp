@@ -56,6 +56,7 @@ LocalizationReport LocalizationPipeline::report() const {
   }
   const PoseEstimate estimate = localizer_->estimate();
   report.health = localizer_->health();
+  if (std::isfinite(report.health.bias_radius_m)) report.bias_radius_m = report.health.bias_radius_m;
   const Eigen::Matrix2d position = estimate.covariance.topLeftCorner<2, 2>();
   report.position_sigma_m =
       std::sqrt(std::max(0.0, Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(position).eigenvalues()(1)));

@@ -266,6 +266,7 @@ void LocalizerNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status
   status.add("position sigma (m)", report.position_sigma_m);
   status.add("heading sigma (rad)", report.health.heading_sigma_rad);
   status.add("bias radius (m)", report.bias_radius_m);
+  status.add("gate inert", report.health.is_gate_inert);
   status.add("effective sample size", report.health.effective_sample_size);
   status.add("cluster mass", report.health.cluster_mass);
   status.add("estimates published", outputs_);

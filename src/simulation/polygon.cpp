@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <boost/geometry.hpp>
+#include <boost/geometry/geometries/multi_point.hpp>
 #include <boost/geometry/geometries/point_xy.hpp>
 #include <boost/geometry/geometries/polygon.hpp>
 #include <cmath>
@@ -89,6 +90,19 @@ std::string polygon_fault(const Polygon& polygon) {
   const std::string crossing = crossing_fault(polygon);
   if (is_flat && (polygon.size() == 3 || crossing.empty())) return "has no area";
   return crossing;
+}
+
+Polygon convex_hull(const std::vector<Eigen::Vector2d>& points) {
+  if (points.empty()) return {};
+  namespace bg = boost::geometry;
+  using Point = bg::model::d2::point_xy<double>;
+  bg::model::multi_point<Point> corners;
+  for (const Eigen::Vector2d& point : points) corners.emplace_back(point.x(), point.y());
+  bg::model::polygon<Point, false, false> hull;  // counter-clockwise, not closed
+  bg::convex_hull(corners, hull);
+  Polygon polygon;
+  for (const Point& corner : hull.outer()) polygon.emplace_back(corner.x(), corner.y());
+  return polygon;
 }
 
 }  // namespace urban_gnss

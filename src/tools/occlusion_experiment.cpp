@@ -20,6 +20,7 @@
 #include "find_scenario.hpp"
 #include "occlusion_series.hpp"
 #include "output_file.hpp"
+#include "overrides.hpp"
 #include "urban_gnss_localization/common/progress.hpp"
 #include "urban_gnss_localization/evaluation/report_json.hpp"
 #include "urban_gnss_localization/evaluation/statistics.hpp"
@@ -46,20 +47,6 @@ struct Options {
   std::string series_directory;
   int jobs = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
 };
-
-template <class... P>
-void read_overrides(const std::string& option, YAML::Node map, const std::vector<std::string>& overrides,
-                    P&... parameters) {
-  for (const std::string& text : overrides) {
-    const auto equal = text.find('=');
-    if (equal == std::string::npos) throw std::runtime_error(option + " " + text + ": must be NAME=VALUE");
-    map[text.substr(0, equal)] = YAML::Load(text.substr(equal + 1));
-  }
-  ParameterReader reader(map);
-  (reader.read(parameters), ...);
-  const auto faults = reader.finish();
-  if (!faults.empty()) throw ParameterError(option, faults);
-}
 
 OcclusionExperimentConditions read_conditions(const Options& options) {
   OcclusionExperimentConditions conditions;

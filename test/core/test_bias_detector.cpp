@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 #include <limits>
 #include <stdexcept>
+#include <utility>
 
 #include "matchers.hpp"
 #include "urban_gnss_localization/filters/bias_detector.hpp"
@@ -33,8 +34,8 @@ TEST(BiasDetector, ThresholdIsTheQuantileForTwoDimensions) {
 
 TEST(BiasDetector, FalseAlarmsComeAtTheirRate) {
   RandomEngine engine = make_engine(1);
-  constexpr int kFixes = 100000;
-  for (const double probability : {0.95, 0.99}) {
+  constexpr int kFixes = 4000000;
+  for (const auto& [probability, fixes_per_ramp] : {std::pair(0.99, 7800.0), std::pair(0.999999, 4630.0)}) {
     BiasDetectorParameters parameters;
     parameters.gate_probability = probability;
     BiasDetector detector(parameters);
@@ -47,7 +48,7 @@ TEST(BiasDetector, FalseAlarmsComeAtTheirRate) {
     }
     const double expected = kFixes * (1.0 - probability);
     EXPECT_NEAR(jumps, expected, 4.5 * std::sqrt(expected)) << probability;
-    EXPECT_LT(ramps, 2 * kFixes / 4800) << probability;
+    EXPECT_NEAR(ramps * fixes_per_ramp / kFixes, 1.0, 0.15) << probability;
   }
 }
 
@@ -64,6 +65,25 @@ TEST(BiasDetector, SlowRampIsFound) {
   }
   EXPECT_GT(found, 5);
   EXPECT_LE(found, 25);
+}
+
+// The mean count of fixes until an innovation with this mean (sigma) is found, by either test.
+TEST(BiasDetector, SteadyBiasIsFoundSoon) {
+  RandomEngine engine = make_engine(3);
+  constexpr int kRuns = 5000;
+  for (const auto& [mean, expected] :
+       {std::pair(0.75, 21.1), std::pair(1.0, 12.7), std::pair(1.5, 6.6), std::pair(2.0, 3.9)}) {
+    double fixes = 0.0;
+    for (int run = 0; run < kRuns; ++run) {
+      BiasDetector detector({});
+      BiasDetection detection;
+      while (!detection.is_biased()) {
+        detection = detector.test(draw(isotropic(1.0), engine) + Eigen::Vector2d(mean, 0.0), isotropic(1.0));
+        fixes += 1.0;
+      }
+    }
+    EXPECT_NEAR(fixes / kRuns, expected, 0.05 * expected) << mean;
+  }
 }
 
 TEST(BiasDetector, SpikeIsNoRamp) {

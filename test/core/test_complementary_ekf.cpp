@@ -120,6 +120,30 @@ TEST(ComplementaryEkf, CovarianceIsHonestInTheOpen) {
   }
 }
 
+// Under the open sky, with white errors as declared, compensation must not cost much.
+TEST(ComplementaryEkf, CompensationCostsLittleInTheOpen) {
+  const auto mean_error = [](const char* mode) {
+    double sum = 0.0;
+    int count = 0;
+    for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+      Drive drive(seed, std::string("{mode: ") + mode + "}");
+      drive.start_with_errors();
+      drive.run(600.0, [&](const FixMeasurement&) {
+        sum += drive.error_m();
+        ++count;
+      });
+    }
+    return sum / count;
+  };
+  const double standard = mean_error("standard");
+  const double compensated = mean_error("compensated");
+  RecordProperty("standard", std::to_string(standard));
+  RecordProperty("compensated", std::to_string(compensated));
+  RecordProperty("of_false_alarms", std::to_string(mean_error("compensated, adapt_fix_noise: false") / standard));
+  RecordProperty("of_adaptation", std::to_string(standard / mean_error("standard, adapt_every_mode: false")));
+  EXPECT_LT(compensated / standard, 1.05);
+}
+
 TEST(ComplementaryEkf, FalseAlarmsComeAtTheirRate) {
   Drive drive(7, "{}", 5.0);
   int tested = 0;
@@ -227,6 +251,49 @@ TEST(ComplementaryEkf, BiasThatWasFusedIsUnlearned) {
   drive.bias = {};
   drive.run(60.0);
   EXPECT_LT(drive.error_m(), 1.5);
+}
+
+TEST(ComplementaryEkf, SmallestDetectableJumpIsFoundAtOnceWithItsPower) {
+  constexpr int kSeeds = 300;
+  double found = 0.0;
+  double smallest = 0.0;
+  for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
+    Drive drive(seed);
+    drive.run(60.0);
+    const double jump = drive.filter.smallest_detectable_jump_m();
+    const double direction = 0.1 * static_cast<double>(seed);
+    drive.bias = [=](double) { return Eigen::Vector2d(jump * std::cos(direction), jump * std::sin(direction)); };
+    drive.run(1.0);
+    found += drive.last.decision == FixDecision::kBiasCompensated;
+    smallest += jump / kSeeds;
+  }
+  RecordProperty("found", std::to_string(found / kSeeds));
+  RecordProperty("smallest_m", std::to_string(smallest));
+  EXPECT_NEAR(found / kSeeds, 0.9, 0.05);  // 0.017 is one sigma; easier to find in most directions
+}
+
+// What is not the paper's can be switched off in its conventional filters.
+TEST(ComplementaryEkf, ConventionalModesBelieveTheDeclaredCovariance) {
+  const auto run = [](const std::string& yaml) {
+    Drive drive(9, yaml);
+    drive.run(60.0);
+    drive.bias = [](double since) { return Eigen::Vector2d(0.3 * since, 0.0); };
+    int rejected = 0;
+    drive.run(60.0, [&](const FixMeasurement&) { rejected += is_rejected(drive.last.decision); });
+    drive.bias = {};
+    drive.speed_mps = 0.0;
+    drive.run(60.0);
+    return std::make_pair(rejected, std::sqrt(drive.filter.error_covariance()(0, 0)));
+  };
+  for (const char* mode : {"standard", "gated"}) {
+    const std::string start = std::string("{adapt_every_mode: false, mode: ") + mode;
+    const auto plain = run(start + "}");
+    const auto without_monitor = run(start + ", adapt_fix_noise: false, parked_correlation_time: 0.0}");
+    const auto adapted = run(std::string("{mode: ") + mode + "}");
+    EXPECT_EQ(plain, without_monitor) << mode;
+    EXPECT_LT(plain.second, 0.5 * adapted.second) << mode << ": parked fixes are taken for independent";
+  }
+  EXPECT_GT(run("{mode: gated}").first, run("{mode: gated, adapt_every_mode: false}").first) << "the ramp is found";
 }
 
 // 2.5 km, as raw least-squares fixes have them.

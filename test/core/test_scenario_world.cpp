@@ -97,6 +97,19 @@ TEST(Polygon, PointOnASharedSideIsInOneOfTheTwo) {
   }
 }
 
+TEST(Polygon, ConvexHullIsTheSmallestAround) {
+  // Corners, points inside, one on a side and one twice, in no order.
+  const Polygon hull = convex_hull({{4, 3}, {1, 1}, {0, 0}, {2, 0}, {4, 0}, {2, 2}, {0, 3}, {4, 0}, {3, 1}});
+  EXPECT_EQ(hull.size(), 4u);
+  EXPECT_DOUBLE_EQ(signed_area(hull), 12.0) << "counter-clockwise";
+  for (const Vector2d& corner : {Vector2d(0, 0), Vector2d(4, 0), Vector2d(4, 3), Vector2d(0, 3)}) {
+    EXPECT_NE(std::find(hull.begin(), hull.end(), corner), hull.end()) << corner.transpose();
+  }
+  EXPECT_TRUE(convex_hull({}).empty());
+  EXPECT_FALSE(contains(convex_hull({{1, 1}}), {0, 0}));
+  EXPECT_DOUBLE_EQ(signed_area(convex_hull({{0, 0}, {1, 1}, {2, 2}})), 0.0);
+}
+
 TEST(Polygon, FaultsHaveTheirReason) {
   EXPECT_EQ(polygon_fault({{0, 0}, {1, 0}, {1, 1}}), "");
   EXPECT_EQ(polygon_fault({{1, 1}, {1, 0}, {0, 0}}), "") << "clockwise";

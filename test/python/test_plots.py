@@ -119,6 +119,31 @@ def write_evaluation_input(directory):
         "command": "evaluate", "runs": {"town/switching": run, "town/ekf": run, "short": run}})
 
 
+def write_bias_input(directory):
+    """A drive with buildings between 40 and 60 s, where the fixes are 8 m off; a scenario without buildings."""
+    t = np.arange(0.0, 100.0)
+    between = (t >= 40.0) & (t <= 60.0)
+    phase = np.where(t < 40.0, 0.0, np.where(between, 1.0, 2.0))
+    phases = {name: {"position_mean_m": value, "position_max_m": 2.0 * value, "nees_mean": 3.0, "doubted_share": 0.25}
+              for name, value in (("before", 1.0), ("between", 4.25), ("after", 1.5))}
+    filters = ("standard", "gated", "compensated", "standard_as_printed", "gated_as_printed", "withheld")
+    nowhere = dict(phases, between=dict.fromkeys(phases["between"]), after=dict.fromkeys(phases["after"]))
+    scenarios = {place: {"fixes": row, "filters": {name: dict(row, settling_time_by_seed_s=times) for name in filters}}
+                 for place, row, times in (("alley", phases, [0.0, 7.0]), ("field", nowhere, [None, None]))}
+    for place, phase_there in (("alley", phase), ("field", 0.0)):
+        data = os.path.join(directory, "data", place)
+        os.makedirs(data)
+        write_csv(os.path.join(data, "truth.csv"), t=t, x=3.0 * t, y=0.0, phase=phase_there)
+        write_csv(os.path.join(data, "fixes.csv"), t=t, error_x=np.where(between, 8.0, np.sin(t)), error_y=np.cos(t))
+        for name in filters:
+            write_csv(os.path.join(data, "estimate_" + name + ".csv"), t=t, x=3.0 * t + 1.0, y=np.sin(t / 9.0),
+                      error_m=1.0, sigma_m=0.7)
+        write_csv(os.path.join(data, "bias_compensated.csv"), t=t, bias_x=np.where(between, 7.5, 0.0), bias_y=0.0,
+                  sigma_x=1.0, sigma_y=1.0, significant=between, doubted=between)
+    write_json(os.path.join(directory, "metrics.json"), {
+        "command": "bias_experiment", "seeds": [1, 2], "scenario_order": ["alley", "field"], "scenarios": scenarios})
+
+
 class ReportCase(unittest.TestCase):
     """A temporary input directory and checks that both reports share."""
 
@@ -324,6 +349,51 @@ class EvaluationTest(ReportCase):
         """Metrics without runs are refused."""
         write_json(self.path("metrics.json"), {"command": "evaluate"})
         self.assert_refuses(self.SCRIPT, self.path("metrics.json") + ": missing object runs")
+
+
+class BiasExperimentTest(ReportCase):
+    """plot_bias_experiment.py."""
+
+    SCRIPT = "plot_bias_experiment.py"
+
+    def setUp(self):
+        """Write the input."""
+        super().setUp()
+        write_bias_input(self.directory)
+
+    def test_pictures_show_something(self):
+        """A picture for each scenario, with the time between the buildings shaded where there are any."""
+        self.assert_succeeds(self.SCRIPT)
+        for name in ("fig6_alley.png", "fig6_field.png"):
+            self.assert_picture(name)
+            self.assertTrue(self.has_colour(name, (0x00, 0x72, 0xb2)), name)
+        self.assertTrue(self.has_colour("fig6_alley.png", (0xe6, 0xe9, 0xf0)))
+        self.assertFalse(self.has_colour("fig6_field.png", (0xe6, 0xe9, 0xf0)))
+
+    def test_table(self):
+        """A row for the fixes and each filter; what does not exist is a dash."""
+        self.assert_succeeds(self.SCRIPT)
+        alley, field = read_text(self.path("table.md")).split("## field")
+        self.assertIn("| compensated | 1.00 / 4.25 / 1.50 | 8.5 | 3.0 / 3.0 / 3.0 | 25.0 | at most 7 |", alley)
+        self.assertIn("| fixes | 1.00 / 4.25 / 1.50 | 8.5 |  |  |  |", alley)
+        for name in ("standard", "gated", "standard_as_printed", "gated_as_printed", "withheld"):
+            self.assertIn("| {} |".format(name), alley)
+        self.assertIn("| compensated | 1.00 / \u2013 / \u2013 | \u2013 | 3.0 / \u2013 / \u2013 |", field)
+        self.assertNotIn("nan", field)
+
+    def test_bias_that_does_not_settle_is_said(self):
+        """Among others that settle it is not lost."""
+        metrics = json.loads(read_text(self.path("metrics.json")))
+        metrics["scenarios"]["alley"]["filters"]["compensated"]["settling_time_by_seed_s"] = [3.0, None]
+        write_json(self.path("metrics.json"), metrics)
+        self.assert_succeeds(self.SCRIPT)
+        self.assertIn("at most 3, 1 not", read_text(self.path("table.md")))
+
+    def test_missing_column_is_named(self):
+        """The file and the column are in the message."""
+        path = self.path("data", "alley", "bias_compensated.csv")
+        drop_column(path, "sigma_y")
+        self.assert_refuses(self.SCRIPT, path + ": missing column sigma_y")
 
 
 if __name__ == "__main__":

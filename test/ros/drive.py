@@ -84,7 +84,8 @@ class Graph:
 
     TIMEOUT_S = 5.0
 
-    def __init__(self):
+    def __init__(self, status_topic="particle_filter/status", listeners=2):
+        """`listeners`: how many nodes take odometry and fixes."""
         self.changed = threading.Condition()
         self.outputs = []
         self.biases = []
@@ -95,10 +96,9 @@ class Graph:
         }
         rospy.Subscriber("odometry/filtered", Odometry, self._on_output, queue_size=1000, tcp_nodelay=True)
         rospy.Subscriber("gps/bias", GpsBias, self._on_bias, queue_size=1000, tcp_nodelay=True)
-        rospy.Subscriber("particle_filter/status", LocalizationStatus, self._on_status, queue_size=1000,
-                         tcp_nodelay=True)
+        rospy.Subscriber(status_topic, LocalizationStatus, self._on_status, queue_size=1000, tcp_nodelay=True)
         # The filter and the bias node take odometry and fixes; the bias node and this test take the estimate.
-        self._await(lambda: all(p.get_num_connections() >= 2 for p in self.publishers.values()), 20.0,
+        self._await(lambda: all(p.get_num_connections() >= listeners for p in self.publishers.values()), 20.0,
                     "the nodes to subscribe")
 
     def _notify(self, action):

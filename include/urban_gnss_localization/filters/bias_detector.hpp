@@ -10,7 +10,7 @@ namespace urban_gnss {
 struct BiasDetectorParameters {
   double gate_probability{0.99};   ///< probability that an unbiased fix is taken for one
   double ramp_slack{0.5};          ///< sigma per fix, a drift of the innovation below this is not summed (CUSUM)
-  double ramp_threshold{8.0};      ///< sigma, sum at which a drift is detected; with these, once in 4 800 fixes falsely
+  double ramp_threshold{8.0};      ///< sigma, sum at which a drift is detected; with these, once in 7800 fixes falsely
   int inert_window{30};            ///< count of fixes over which the NIS is summed for "gate inert"
   double inert_probability{1e-4};  ///< probability that a working gate is called inert
 

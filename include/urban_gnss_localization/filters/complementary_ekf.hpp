@@ -14,9 +14,9 @@
 namespace urban_gnss {
 
 enum class ComplementaryMode {
-  kStandard,     ///< every fix is used as it is: the paper's complementary integration without compensation
-  kGated,        ///< a fix that is taken for biased is rejected
-  kCompensated,  ///< the paper's: its bias is estimated
+  kStandard,     ///< the paper's conventional filter (section 2.3): every fix as it is, with its declared covariance
+  kGated,        ///< the same, but a fix whose NIS is above its quantile is rejected
+  kCompensated,  ///< the paper's: its bias is estimated; the noise of the fixes is taken as they show it
 };
 EnumNames<ComplementaryMode> enum_names(ComplementaryMode);
 
@@ -29,6 +29,9 @@ EnumNames<LockoutPolicy> enum_names(LockoutPolicy);
 
 struct ComplementaryEkfParameters {
   ComplementaryMode mode{ComplementaryMode::kCompensated};
+  /// Standard and gated too take the noise as the fixes show it, and (gated) find ramps; false: the paper's
+  /// conventional filter (section 2.3), which believes what a fix declares.
+  bool adapt_every_mode{true};
   double fix_bias_sigma{20.0};     ///< m per axis, M0: the bias when its filter opens
   double fix_bias_time{30.0};      ///< s, time after which a bias has faded; with fix_bias_sigma this gives Q_b
   double close_probability{0.95};  ///< a bias inside this quantile is insignificant
@@ -48,6 +51,7 @@ struct ComplementaryEkfParameters {
   template <class V>
   void visit(V& v) {
     v("mode", mode);
+    v("adapt_every_mode", adapt_every_mode);
     v("fix_bias_sigma", fix_bias_sigma, positive());
     v("fix_bias_time", fix_bias_time, positive());
     v("close_probability", close_probability, between(0.01, 0.999999));
@@ -106,8 +110,6 @@ class ComplementaryEkf : public Localizer {
   bool is_bias_open() const { return is_open_; }
   Eigen::Vector2d bias() const { return filter_.bias(); }
   Eigen::Matrix2d bias_covariance() const { return filter_.bias_covariance(); }
-  /// Factor by which the declared covariance of the fixes is multiplied.
-  double fix_noise_inflation() const { return noise_monitor_.inflation(); }
   /// Whether the gate cannot find anything, as the NIS runs far below its expectation (F4).
   bool is_gate_inert() const { return is_inert_; }
   /// smallest_detectable_jump (m) at the last fix; 0 before the first.
@@ -135,6 +137,8 @@ class ComplementaryEkf : public Localizer {
     bool is_frozen;
   };
 
+  /// Whether the noise of the fixes is taken as they scatter, and slow drifts of them are looked for.
+  bool is_adaptive() const;
   /// Factor on the declared covariance, as the fixes scatter and as the robot stands.
   double noise_inflation() const;
   /// Without a heading: takes the fix for the position and for the search. True where the heading was found.

@@ -8,10 +8,10 @@
 namespace urban_gnss {
 
 struct FixNoiseParameters {
-  bool adapt_fix_noise{true};             ///< enlarge the declared covariance as the fixes show; false: believe it
-  double fix_noise_horizon{20.0};         ///< s apart at which the errors of two fixes are taken for independent
-  double fix_noise_memory{60.0};          ///< count of fixes that the statistics are averaged over
-  double fix_noise_max_inflation{100.0};  ///< most that a covariance is multiplied by
+  bool adapt_fix_noise{true};            ///< enlarge the declared covariance as the fixes show; false: believe it
+  double fix_noise_horizon{20.0};        ///< s apart at which the errors of two fixes are taken for independent
+  double fix_noise_memory{60.0};         ///< count of fixes that the statistics are averaged over
+  double fix_noise_max_inflation{20.0};  ///< most that a covariance is multiplied by
 
   template <class V>
   void visit(V& v) {

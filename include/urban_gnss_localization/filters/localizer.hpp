@@ -35,6 +35,8 @@ struct LocalizerHealth {
   double position_spread_m{std::numeric_limits<double>::quiet_NaN()};
   double cluster_mass{std::numeric_limits<double>::quiet_NaN()};
   std::uint32_t cluster_count{0};
+  double bias_radius_m{std::numeric_limits<double>::quiet_NaN()};  ///< of the bias that it estimates itself
+  bool is_gate_inert{false};  ///< its gate passes everything, as the fixes' covariance is far too large
 };
 
 /// A pose filter of odometry and fixes in the map frame. It knows no clock and no message: the pipeline calls it in the
