@@ -13,7 +13,7 @@
 #   screenshot_rviz.sh docs/rviz_city.png /ground_truth/odom 'm.header.stamp.to_sec() > 1777863640' \
 #     demo.launch scenario:=downtown_grid real_time_factor:=0.5
 #   screenshot_rviz.sh docs/rviz_occlusion.png /ground_truth/odom 'm.header.stamp.to_sec() > 1777863632' \
-#     demo.launch scenario:=downtown_grid occlusion:=true localizer:=ukf real_time_factor:=0.4
+#     demo.launch scenario:=downtown_grid occlusion:=true real_time_factor:=0.4
 #
 # Without a graphics card rviz draws a few frames a second: a slow simulation or bag keeps its displays in step.
 set -eo pipefail

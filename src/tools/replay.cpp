@@ -33,7 +33,7 @@ namespace {
 
 struct Options {
   std::string input;
-  std::string localizer = "particle_filter";
+  std::string localizer = "imm_ekf";
   std::vector<std::string> params;
   std::vector<std::string> overrides;
   std::string output;

@@ -117,8 +117,8 @@ class GraphTest(unittest.TestCase):
                     bag.write("/" + topic, message, message.header.stamp + rospy.Duration(0, index))
             parameters = os.path.join(directory, "parameters.yaml")
             subprocess.run(["rosparam", "dump", parameters, "/offline"], check=True)
-            subprocess.run(["rosrun", "urban_gnss_localization", "replay", source, "--params", parameters,
-                            "--output", result], check=True)
+            subprocess.run(["rosrun", "urban_gnss_localization", "replay", source, "--localizer", "particle_filter",
+                            "--params", parameters, "--output", result], check=True)
             with rosbag.Bag(result) as bag:
                 offline = drive.poses([m for _, m, _ in bag.read_messages("/odometry/filtered")])
         self.assertEqual([p[0] for p in live], [p[0] for p in offline])
