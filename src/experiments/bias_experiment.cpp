@@ -3,8 +3,8 @@
 #include <cmath>
 #include <memory>
 
+#include "urban_gnss_localization/experiments/city_drive.hpp"
 #include "urban_gnss_localization/geometry/local_frame.hpp"
-#include "urban_gnss_localization/simulation/city_simulator.hpp"
 #include "urban_gnss_localization/simulation/polygon.hpp"
 
 namespace urban_gnss {
@@ -61,7 +61,7 @@ class Contestant {
   std::unique_ptr<LocalizationPipeline> pipeline_;
 };
 
-class Experiment {
+class Experiment : public DriveParticipant {
  public:
   Experiment(const Scenario& scenario, const BiasExperimentConditions& conditions, BiasRun& run)
       : frame_(scenario.datum), hull_(hull_of(scenario.world)), run_(run) {
@@ -71,56 +71,47 @@ class Experiment {
     }
   }
 
-  void handle(const SimulationEvent& event) {
-    stamp_ = event.stamp;
-    std::visit([this](const auto& content) { add(content); }, event.content);
+  bool wants_clouds() const override { return false; }
+  void add_cloud(Stamp, const PointCloud&, const Eigen::Isometry3d&, const Pose2&) override {}
+
+  void add_odometry(const OdometrySample& sample) override {
+    for (const auto& contestant : contestants_) contestant->add_odometry(sample);
+  }
+
+  void add_epoch(const DriveEpoch& epoch, const Pose2&) override {
+    if (!epoch.fix) return;
+    run_.fix_errors.emplace_back(epoch.stamp, epoch.error_m);
+    RawFix fix;
+    fix.stamp = epoch.stamp;
+    fix.position = frame_.to_geodetic(epoch.fix->position);
+    fix.covariance = epoch.fix->covariance;
+    fix.covariance_type = CovarianceType::kApproximated;
+
+    const bool is_between = contains(hull_, epoch.fix->position.head<2>() - epoch.error_m);
+    was_between_ = was_between_ || is_between;
+    is_recovered_ = !is_between && (!was_between_ || is_recovered_ || epoch.error_m.norm() < kRecovered_m);
+    for (const auto& contestant : contestants_) {
+      if (is_recovered_ || !contestant->is_withheld()) contestant->add_fix(fix);
+    }
+  }
+
+  /// The first and last moment between the buildings.
+  std::optional<std::pair<Stamp, Stamp>> between(const Trajectory& truth) const {
+    std::optional<std::pair<Stamp, Stamp>> between;
+    for (const TimedPose& pose : truth) {
+      if (!contains(hull_, pose.pose.position())) continue;
+      if (!between) between = std::make_pair(pose.stamp, pose.stamp);
+      between->second = pose.stamp;
+    }
+    return between;
   }
 
  private:
-  template <class Other>
-  void add(const Other&) {}
-  void add(const TruthEvent& truth) {
-    run_.truth.push_back({stamp_, truth.pose});
-    if (!contains(hull_, truth.pose.position())) return;
-    if (!run_.between) run_.between = std::make_pair(stamp_, stamp_);
-    run_.between->second = stamp_;
-  }
-  void add(const OdometryEvent& odometry) {
-    for (const auto& contestant : contestants_) contestant->add_odometry({stamp_, odometry.pose, odometry.twist});
-  }
-  void add(const FixEvent& event) {
-    if (event.published.has_fix) fix_ = event.published.fix;
-    if (!event.published.has_fix || event.published.publisher != 0 || !fix_.position.allFinite()) return;
-    RawFix raw;
-    raw.stamp = stamp_;
-    raw.position = frame_.to_geodetic(fix_.position);
-    raw.covariance = fix_.covariance;
-    raw.covariance_type = CovarianceType::kApproximated;
-    for (const auto& contestant : contestants_) {
-      if (!contestant->is_withheld()) contestant->add_fix(raw);
-    }
-    waiting_ = raw;
-  }
-  /// Comes right after its fix.
-  void add(const FixTruthEvent& truth) {
-    const Eigen::Vector2d error = truth.error.head<2>();
-    run_.fix_errors.emplace_back(stamp_, error);
-    const bool is_between = contains(hull_, (fix_.position - truth.error).head<2>());
-    const bool is_after = run_.between.has_value() && !is_between;
-    is_recovered_ = !is_between && (!is_after || is_recovered_ || error.norm() < kRecovered_m);
-    if (!is_recovered_) return;
-    for (const auto& contestant : contestants_) {
-      if (contestant->is_withheld()) contestant->add_fix(waiting_);
-    }
-  }
-
   LocalFrame frame_;
   Polygon hull_;
   BiasRun& run_;
   std::vector<std::unique_ptr<Contestant>> contestants_;
-  Stamp stamp_{0};  ///< of the event at hand
-  ReceiverFix fix_;
-  RawFix waiting_;
+  bool was_between_{false};
   bool is_recovered_{true};
 };
 
@@ -145,14 +136,9 @@ std::optional<double> settling_time_s(const BiasRun& run, const std::vector<Bias
 
 BiasRun run_bias_experiment(const Scenario& scenario, const BiasExperimentConditions& conditions) {
   BiasRun run;
-  CitySimulator simulator(scenario);
   Experiment experiment(scenario, conditions, run);
-  std::vector<SimulationEvent> events;
-  while (!simulator.is_finished()) {
-    events.clear();
-    simulator.step(std::nullopt, events);
-    for (const SimulationEvent& event : events) experiment.handle(event);
-  }
+  run.truth = drive_city(scenario, 1, {&experiment}, [](double) {}).truth;
+  run.between = experiment.between(run.truth);
   return run;
 }
 
