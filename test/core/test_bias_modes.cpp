@@ -104,7 +104,7 @@ TEST(BiasModes, AgreesWithASimulationOfTheTimes) {
       }
       counts[static_cast<int>(index_of(mode))] += 1.0 / runs;
     }
-    const auto row = mode_transition(horizon, p).row(static_cast<int>(index_of(start)));
+    const Eigen::RowVector4d row = mode_transition(horizon, p).row(static_cast<int>(index_of(start)));
     // 4.5 standard deviations of a share of 0.5
     EXPECT_LT((counts.transpose() - row).cwiseAbs().maxCoeff(), 4.5 * std::sqrt(0.25 / runs)) << counts << "\n" << row;
   }
