@@ -24,6 +24,7 @@ Eigen::Matrix<double, 3, 2> linearise(const Pose2& pose, const OdometryErrors& e
   k << std::cos(chord_yaw), -0.5 * dy, std::sin(chord_yaw), 0.5 * dx, 0.0, 1.0;
   step.transition.block<3, 1>(0, 3) = k.col(0) * measured.speed_mps * duration_s;
   step.transition.block<3, 1>(0, 4) = k.col(1) * duration_s;
+  step.yaw_rate_scale = k.col(1) * measured.yaw_rate_radps * duration_s;
   return k;
 }
 
@@ -40,6 +41,7 @@ DeadReckoningStep dead_reckon(const Pose2& pose, const OdometryErrors& errors, c
   DeadReckoningStep step;
   step.transition.setIdentity();
   step.noise.setZero();
+  step.yaw_rate_scale.setZero();
   if (p.estimate_odometry_errors) {
     step.noise(3, 3) = square(p.odom_scale_walk) * duration_s;
     step.noise(4, 4) = square(p.odom_yaw_bias_walk) * duration_s;
@@ -64,6 +66,7 @@ DeadReckoningStep dead_reckon(const Pose2& pose, const OdometryErrors& errors, c
   const double dt = motion.duration_s;
   DeadReckoningStep step;
   step.noise.setZero();
+  step.yaw_rate_scale.setZero();
   if (is_parked(motion.twist)) {
     step.pose = pose;
     step.transition.setIdentity();

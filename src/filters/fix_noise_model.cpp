@@ -1,5 +1,6 @@
 #include "urban_gnss_localization/filters/fix_noise_model.hpp"
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 
@@ -14,6 +15,8 @@ constexpr double kMostInflation = 1e6;
 
 void FixNoiseModel::reset() {
   scale_ = 1.0;
+  lagged_scale_ = 0.0;
+  fixes_.clear();
   last_s_.reset();
   moved_m_ = 0.0;
   elapsed_s_ = 0.0;
@@ -32,13 +35,38 @@ double FixNoiseModel::correlation_inflation(double time_s) const {
   return std::min(1.0 / std::tanh(0.5 * ratio), kMostInflation);  // (1 + a) / (1 - a)
 }
 
-void FixNoiseModel::learn(double time_s, double exceeding) {
+double FixNoiseModel::changed(double scale, double exceeding) const {
   const double limit = 2.0 * std::log(parameters_.fix_scale_limit);
   const double step = parameters_.fix_scale_rate * (2.0 * exceeding - 1.0);
-  scale_ = std::exp(std::clamp(std::log(scale_) + step, -limit, limit));
+  return std::exp(std::clamp(std::log(scale) + step, -limit, limit));
+}
+
+void FixNoiseModel::learn(double time_s, double exceeding) {
+  scale_ = changed(scale_, exceeding);
   last_s_ = time_s;
   moved_m_ = 0.0;
   elapsed_s_ = 0.0;
+}
+
+void FixNoiseModel::compare(const DeadReckonedFix& fix) {
+  if (lag_s_ <= 0.0) return;
+  while (fixes_.size() > 1 && fix.time_s - fixes_[1].time_s >= lag_s_) fixes_.pop_front();
+  if (!fixes_.empty()) {
+    const DeadReckonedFix& before = fixes_.front();
+    const double apart = fix.time_s - before.time_s;
+    if (apart >= lag_s_ && apart < 2.0 * lag_s_) {
+      if (lagged_scale_ == 0.0) lagged_scale_ = scale_;
+      const double turned =
+          (fix.place - before.place).norm() * std::max(fix.heading_sigma_rad, before.heading_sigma_rad);
+      const Eigen::Matrix2d covariance =
+          lagged_scale_ * (fix.covariance + before.covariance) +
+          (std::max(fix.walk_m2 - before.walk_m2, 0.0) + turned * turned) * Eigen::Matrix2d::Identity();
+      const Eigen::Vector2d difference = fix.misfit - before.misfit;
+      const double nis = difference.dot(covariance.inverse() * difference);
+      lagged_scale_ = changed(lagged_scale_, nis > kMedianNis ? 1.0 : 0.0);
+    }
+  }
+  fixes_.push_back(fix);
 }
 
 }  // namespace urban_gnss

@@ -12,6 +12,7 @@ namespace {
 
 constexpr int kFixDof = 2;
 constexpr int kYaw = 2;
+constexpr int kYawRateScale = kErrorStates;
 /// Of direct reception's normalised innovation, for the verdict alone.
 constexpr double kReportedQuantile = 0.99;
 constexpr BiasMode kModes[kContinuations] = {BiasMode::kDirect, BiasMode::kSlow, BiasMode::kFast, BiasMode::kJump};
@@ -50,7 +51,7 @@ ImmEkf::ImmEkf(const ImmEkfParameters& parameters, const MotionParameters& motio
     : parameters_(parameters),
       motion_(motion),
       nis_threshold_(chi_squared_quantile(kReportedQuantile, kFixDof)),
-      noise_(parameters.noise) {
+      noise_(parameters.noise, parameters.fix_scale_lag) {
   initialize({});
 }
 
@@ -61,12 +62,15 @@ void ImmEkf::initialize(const PoseEstimate& start) {
   first.mean.head<3>() << start.pose.x, start.pose.y, wrap_angle(start.pose.yaw);
   first.covariance.topLeftCorner<kErrorStates, kErrorStates>() =
       initial_error_covariance(start.covariance, parameters_.odometry);
+  first.covariance(kYawRateScale, kYawRateScale) = parameters_.yaw_rate_scale_sigma * parameters_.yaw_rate_scale_sigma;
   filters_.fill(first);
   probability_ << 1.0, 0.0, 0.0;
   bias_odds_ = 1.0;
   noise_.reset();
   last_fix_s_.reset();
   moved_s_ = 0.0;
+  corrections_.setZero();
+  common_variance_m2_ = 0.0;
 }
 
 void ImmEkf::move(const Twist2& twist, double duration_s) {
@@ -74,15 +78,21 @@ void ImmEkf::move(const Twist2& twist, double duration_s) {
   moved_s_ += duration_s;
   noise_.move(twist, duration_s);
   const MotionStep motion = make_motion_step(twist, duration_s, motion_, parameters_.odometry);
+  Eigen::Matrix<double, kMotionStates, kMotionStates> transition;
+  transition.setIdentity();
   for (Gaussian& filter : filters_) {
     const DeadReckoningStep step =
-        dead_reckon(pose_of(filter.mean), {filter.mean[3], filter.mean[4]}, motion, parameters_.odometry);
+        dead_reckon(pose_of(filter.mean), {filter.mean[3], filter.mean[4], filter.mean[kYawRateScale]}, motion,
+                    parameters_.odometry);
     filter.mean.head<3>() << step.pose.x, step.pose.y, step.pose.yaw;
-    auto odometry = filter.covariance.topLeftCorner<kErrorStates, kErrorStates>();
-    odometry = (step.transition * odometry * step.transition.transpose() + step.noise).eval();
-    auto with_bias = filter.covariance.topRightCorner<kErrorStates, 2>();
-    with_bias = (step.transition * with_bias).eval();
-    filter.covariance.bottomLeftCorner<2, kErrorStates>() = with_bias.transpose();
+    transition.topLeftCorner<kErrorStates, kErrorStates>() = step.transition;
+    transition.block<3, 1>(0, kYawRateScale) = step.yaw_rate_scale;
+    auto odometry = filter.covariance.topLeftCorner<kMotionStates, kMotionStates>();
+    odometry = (transition * odometry * transition.transpose()).eval();
+    odometry.topLeftCorner<kErrorStates, kErrorStates>() += step.noise;
+    auto with_bias = filter.covariance.topRightCorner<kMotionStates, 2>();
+    with_bias = (transition * with_bias).eval();
+    filter.covariance.bottomLeftCorner<2, kMotionStates>() = with_bias.transpose();
   }
 }
 
@@ -168,6 +178,7 @@ FixVerdict ImmEkf::correct(const FixMeasurement& fix) {
     verdict.reason = "position, time or covariance cannot be used";
     return verdict;
   }
+  const Gaussian before = mixture();
   const double elapsed_s = last_fix_s_ ? std::max(fix.time_s - *last_fix_s_, 0.0) : moved_s_;
   const ModeTransition transition = mode_transition(elapsed_s, parameters_.modes, bias_odds_);
   const Eigen::Vector4d prior = transition.transpose() * probability_;
@@ -214,6 +225,7 @@ FixVerdict ImmEkf::correct(const FixMeasurement& fix) {
   }
   probability_ << posterior[index_of(BiasMode::kDirect)], slow, posterior[index_of(BiasMode::kFast)];
   last_fix_s_ = fix.time_s;
+  compare_with_odometry(fix, before);
 
   verdict.decision = probability_[0] >= 0.5 ? FixDecision::kAccepted : FixDecision::kBiasCompensated;
   if (any_outlier > 0.5) {
@@ -221,6 +233,21 @@ FixVerdict ImmEkf::correct(const FixMeasurement& fix) {
     verdict.reason = "outlier, probability " + std::to_string(any_outlier);
   }
   return verdict;
+}
+
+void ImmEkf::compare_with_odometry(const FixMeasurement& fix, const Gaussian& before) {
+  const double walk = parameters_.odometry.position_walk;
+  DeadReckonedFix beside;
+  beside.place = transform_point(pose_of(before.mean), fix.antenna_in_body) - corrections_;
+  beside.misfit = fix.position - beside.place;
+  beside.covariance = parameters_.fix.direct_covariance(fix.covariance);
+  beside.walk_m2 = walk * walk * moved_s_;
+  beside.heading_sigma_rad = std::sqrt(before.covariance(kYaw, kYaw));
+  beside.time_s = fix.time_s;
+  noise_.compare(beside);
+  corrections_ += mixture().mean.head<2>() - before.mean.head<2>();
+  const double common = parameters_.common_error_sigma;
+  common_variance_m2_ = std::min(common * common, 0.5 * beside.covariance.trace());
 }
 
 Gaussian ImmEkf::mixture() const {
@@ -231,7 +258,9 @@ Pose2 ImmEkf::pose() const { return pose_of(mixture().mean); }
 
 PoseEstimate ImmEkf::estimate() const {
   const Gaussian all = mixture();
-  return {pose_of(all.mean), all.covariance.topLeftCorner<3, 3>()};
+  PoseEstimate estimate{pose_of(all.mean), all.covariance.topLeftCorner<3, 3>()};
+  estimate.covariance.diagonal().head<2>().array() += common_variance_m2_;
+  return estimate;
 }
 
 LocalizerHealth ImmEkf::health() const {

@@ -63,7 +63,7 @@ Pose2 move_noisily(const Pose2& pose, const MotionStep& step, const MotionNoise&
     twist.yaw_rate_radps += step.input_sigma * noise.input;
   }
   twist.speed_mps += errors.speed_scale * step.twist.speed_mps;
-  twist.yaw_rate_radps += errors.yaw_rate_bias_radps;
+  twist.yaw_rate_radps += errors.yaw_rate_scale * step.twist.yaw_rate_radps + errors.yaw_rate_bias_radps;
   Pose2 moved = move(pose, twist, step.duration_s);
   moved.yaw = wrap_angle(moved.yaw + step.yaw_rate_sigma * noise.yaw_rate * step.duration_s);
   return moved;

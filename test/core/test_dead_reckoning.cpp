@@ -104,6 +104,10 @@ TEST(DeadReckoning, LinearisesTheMotionModel) {
       EXPECT_NEAR(step.transition(1, i), (after.y - step.pose.y) / h, 2e-4) << i;
       EXPECT_NEAR(step.transition(2, i), angle_difference(after.yaw, step.pose.yaw) / h, 2e-4) << i;
     }
+    const Pose2 turned = move_noisily(start, moved, {}, {errors.speed_scale, errors.yaw_rate_bias_radps, h});
+    EXPECT_NEAR(step.yaw_rate_scale.x(), (turned.x - step.pose.x) / h, 2e-4);
+    EXPECT_NEAR(step.yaw_rate_scale.y(), (turned.y - step.pose.y) / h, 2e-4);
+    EXPECT_NEAR(step.yaw_rate_scale.z(), angle_difference(turned.yaw, step.pose.yaw) / h, 2e-4);
     RandomEngine engine = make_engine(9);
     std::vector<double> x, y, yaw;
     for (int k = 0; k < 20000; ++k) {
@@ -125,6 +129,7 @@ TEST(DeadReckoning, ParkedRobotWalksAsMuchAsItsPlaceMayBeWrong) {
   const DeadReckoningStep step = dead_reckon({1.0, 2.0, 3.0}, {0.1, 0.01}, parked, {});
   EXPECT_TRUE((step.pose == Pose2{1.0, 2.0, 3.0}));
   EXPECT_TRUE(step.transition.isIdentity());
+  EXPECT_TRUE(step.yaw_rate_scale.isZero());
   EXPECT_NEAR(step.noise(0, 0), 4.0 * 0.03 * 0.03, 1e-12);
   EXPECT_EQ(step.noise(2, 2), 0.0);
 }

@@ -66,6 +66,47 @@ TEST(FixNoiseModel, CorrelatedFixesAreWorthLess) {
   EXPECT_EQ(model.correlation_inflation(2.0), 1.0);
 }
 
+/// The factor after fixes each second whose errors are a Markov process of standard deviation `sigma` m, declared as
+/// 1 m, to a filter that follows them: its innovations say nothing. The odometry is off by `drift` m/s.
+double followed_scale(double sigma, double correlation_s, double lag_s, double drift, double walk_m2_per_s) {
+  FixNoiseModel model(make("fix_scale_rate: 0.01"), lag_s);
+  RandomEngine engine = make_engine(4);
+  const double a = std::exp(-1.0 / correlation_s);
+  const auto draw = [&] { return Eigen::Vector2d(sigma * draw_normal(engine), sigma * draw_normal(engine)); };
+  Eigen::Vector2d error = draw();
+  double log_sum = 0.0;
+  constexpr int kCount = 20000;
+  for (int k = 0; k < kCount; ++k) {
+    error = a * error + std::sqrt(1.0 - a * a) * draw();
+    model.learn(k, 0.0);
+    DeadReckonedFix fix;
+    fix.misfit = error + Eigen::Vector2d(drift * k, 0.0);
+    fix.covariance.setIdentity();
+    fix.place = {5.0 * k, 0.0};
+    fix.walk_m2 = walk_m2_per_s * k;
+    fix.time_s = k;
+    model.compare(fix);
+    if (k >= kCount / 2) log_sum += std::log(model.scale());
+  }
+  return std::exp(log_sum / (kCount / 2));
+}
+
+TEST(FixNoiseModel, FixesFartherApartThanTheReceiverSmoothsTellTheirErrors) {
+  const double least = 1.0 / (20.0 * 20.0);
+  EXPECT_NEAR(followed_scale(2.0, 5.0, 0.0, 0.0, 0.0), least, 0.1 * least);  // nothing to stop it
+  for (const double sigma : {0.3, 1.0, 3.0}) {
+    EXPECT_NEAR(followed_scale(sigma, 5.0, 30.0, 0.0, 0.0) / (sigma * sigma), 1.0, 0.15) << sigma;
+    // Closer together they share 1 - exp(-10 / 8) of their variance.
+    EXPECT_NEAR(followed_scale(sigma, 8.0, 10.0, 0.0, 0.0) / (sigma * sigma), 0.71, 0.15) << sigma;
+  }
+}
+
+TEST(FixNoiseModel, WhatTheOdometryIsUnsureOfIsNoErrorOfTheFixes) {
+  const double known = followed_scale(0.5, 2.0, 20.0, 0.05, 0.0);
+  EXPECT_GT(known, 0.5);
+  EXPECT_LT(followed_scale(0.5, 2.0, 20.0, 0.05, 0.05), 0.4 * known);
+}
+
 TEST(FixNoiseModel, AResetForgetsTheFactorF26) {
   FixNoiseModel model(make());
   for (int k = 0; k < 50; ++k) model.learn(k, 1.0);

@@ -13,7 +13,8 @@ namespace {
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 ImmEkfParameters textbook(const std::string& changes = "{}") {
-  return with(with(ImmEkfParameters{}, kTextbookNoise), changes);
+  const ImmEkfParameters plain = with(ImmEkfParameters{}, "{yaw_rate_scale_sigma: 0.0, common_error_sigma: 0.0}");
+  return with(with(plain, kTextbookNoise), changes);
 }
 ImmEkf make(const std::string& changes = "{}") { return ImmEkf(textbook(changes), {}); }
 
@@ -145,6 +146,42 @@ TEST(ImmEkf, LearnsTheOdometrysErrors) {
   EXPECT_LT(std::sqrt(all.covariance(4, 4)), 0.002);
 }
 
+TEST(ImmEkf, LearnsAYawRateThatIsWrongByAFactor) {
+  const auto error_after_turning = [](const std::string& changes) {
+    ImmEkf imm = make(changes);
+    imm.initialize(pose_with_sigma({}, 0.3, 0.05));
+    Pose2 truth;
+    const auto move_both = [&](double yaw_rate, double duration_s) {
+      truth = move(truth, {1.5, 1.04 * yaw_rate}, duration_s);
+      imm.move({1.5, yaw_rate}, duration_s);
+    };
+    RandomEngine engine = make_engine(5);
+    for (int k = 0; k < 4000; ++k) {
+      move_both(k / 200 % 2 == 0 ? 0.3 : -0.2, 0.1);  // both ways: a constant error would not do
+      const Eigen::Vector2d noise(draw_normal(engine), draw_normal(engine));
+      if (k % 10 == 9) imm.correct(fix_of(truth.position() + 0.5 * noise, 0.5, 0.1 * (k + 1)));
+    }
+    if (imm.mixture().covariance(5, 5) > 0.0) {
+      EXPECT_NEAR(imm.mixture().mean[5], 0.04, 3.0 * std::sqrt(imm.mixture().covariance(5, 5)));
+      EXPECT_NEAR(imm.mixture().mean[5], 0.04, 0.01);
+    }
+    for (int k = 0; k < 300; ++k) move_both(0.3, 0.1);
+    return (imm.pose().position() - truth.position()).norm();
+  };
+  EXPECT_LT(error_after_turning("yaw_rate_scale_sigma: 0.03"), 0.5 * error_after_turning("{}"));
+}
+
+TEST(ImmEkf, ErrorThatAllFixesShareIsInTheCovarianceAlone) {
+  ImmEkf with_it = make("common_error_sigma: 0.7");
+  ImmEkf without = make();
+  const auto a = drive(with_it, {});
+  const auto b = drive(without, {});
+  EXPECT_TRUE(a.back().estimate.pose == b.back().estimate.pose);
+  const Eigen::Matrix3d added = a.back().estimate.covariance - b.back().estimate.covariance;
+  // No more than the fixes declare: 0.5 m.
+  EXPECT_TRUE(added.isApprox(Eigen::Vector3d(0.25, 0.25, 0.0).asDiagonal().toDenseMatrix(), 1e-9)) << added;
+}
+
 TEST(ImmEkf, ASpikeSaysNothing) {
   ImmEkf imm = make();
   drive(imm, {});
@@ -263,21 +300,37 @@ TEST(ImmEkf, OddsOfABiasMatter) {
 
 TEST(ImmEkf, EveryParameterHasAnEffectF36) {
   const std::vector<std::pair<std::string, std::string>> changes = {
-      {"use_fix_covariance: false", "{}"}, {"direct_sigma: 1.0", "{}"},
-      {"shadow_sigma: 1.0", "{}"},         {"direct_time: 20.0", "{}"},
-      {"slow_bias_time: 5.0", "{}"},       {"fast_bias_time: 3.0", "{}"},
-      {"bias_end_time: 5.0", "{}"},        {"jump_share: 0.5", "{}"},
-      {"slow_bias_walk: 0.5", "{}"},       {"fast_bias_walk: 3.0", "{}"},
-      {"jump_sigma: 5.0", "{}"},           {"onset_sigma: 1.0", "{}"},
-      {"outlier_share: 0.1", "{}"},        {"outlier_radius: 20.0", "{}"},
-      {"motion_noise_factor: 1.0", "{}"},  {"speed_scale_sigma: 0.01", "{}"},
-      {"speed_scale_walk: 0.01", "{}"},    {"yaw_rate_bias_sigma: 0.01", "{}"},
-      {"yaw_rate_bias_walk: 0.001", "{}"}, {"position_walk: 0.2", "{}"},
-      {"heading_walk: 0.05", "{}"},        {"bias_fade_time: 5.0", "{}"},
-      {"student_dof: 2.0", "{}"},          {"fix_scale_rate: 0.1", "{}"},
-      {"fix_correlation_time: 2.0", "{}"}, {"fix_scale_limit: 1.05", "fix_scale_rate: 0.1"},
+      {"use_fix_covariance: false", "{}"},
+      {"direct_sigma: 1.0", "{}"},
+      {"shadow_sigma: 1.0", "{}"},
+      {"direct_time: 20.0", "{}"},
+      {"slow_bias_time: 5.0", "{}"},
+      {"fast_bias_time: 3.0", "{}"},
+      {"bias_end_time: 5.0", "{}"},
+      {"jump_share: 0.5", "{}"},
+      {"slow_bias_walk: 0.5", "{}"},
+      {"fast_bias_walk: 3.0", "{}"},
+      {"jump_sigma: 5.0", "{}"},
+      {"onset_sigma: 1.0", "{}"},
+      {"outlier_share: 0.1", "{}"},
+      {"outlier_radius: 20.0", "{}"},
+      {"motion_noise_factor: 1.0", "{}"},
+      {"speed_scale_sigma: 0.01", "{}"},
+      {"speed_scale_walk: 0.01", "{}"},
+      {"yaw_rate_bias_sigma: 0.01", "{}"},
+      {"yaw_rate_bias_walk: 0.001", "{}"},
+      {"position_walk: 0.2", "{}"},
+      {"heading_walk: 0.05", "{}"},
+      {"bias_fade_time: 5.0", "{}"},
+      {"student_dof: 2.0", "{}"},
+      {"fix_scale_rate: 0.1", "{}"},
+      {"fix_correlation_time: 2.0", "{}"},
+      {"fix_scale_limit: 1.05", "fix_scale_rate: 0.1"},
+      {"fix_scale_lag: 0.0", "fix_scale_rate: 0.1"},
+      {"yaw_rate_scale_sigma: 0.02", "{}"},
   };
-  EXPECT_EQ(changes.size() + 2, parameter_names(ImmEkfParameters{}).size());  // and those of a parked robot
+  EXPECT_EQ(changes.size() + 3,
+            parameter_names(ImmEkfParameters{}).size());  // those of a parked robot, common_error_sigma
   SwitchingDrive d;
   d.bias = bias_between(20.0, 40.0, {4.0, 3.0});
   d.duration_s = 60.0;

@@ -42,9 +42,10 @@ using ErrorCovariance = Eigen::Matrix<double, kErrorStates, kErrorStates>;
 /// One step of dead reckoning: Kim et al. eq. (1), with the chord in place of the tangent, and the J and the
 /// K Sigma_v K' + Sigma_N of eq. (2), for the pose and the odometry's errors.
 struct DeadReckoningStep {
-  Pose2 pose;                  ///< moved
-  ErrorCovariance transition;  ///< J: how an error before the step shows after it
-  ErrorCovariance noise;       ///< of the step
+  Pose2 pose;                      ///< moved
+  ErrorCovariance transition;      ///< J: how an error before the step shows after it
+  ErrorCovariance noise;           ///< of the step
+  Eigen::Vector3d yaw_rate_scale;  ///< how an error of the yaw rate's scale (1) shows in the pose after it
 };
 
 /// Whether the wheels stand: the odometry then has no error, neither noise nor bias.

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
+#include <deque>
 #include <optional>
 
 #include "urban_gnss_localization/common/parameters.hpp"
@@ -26,6 +28,16 @@ struct FixNoiseModelParameters {
   void check(std::vector<std::string>&) const {}
 };
 
+/// A fix beside what was dead-reckoned.
+struct DeadReckonedFix {
+  Eigen::Vector2d misfit;      ///< m, fix minus the dead-reckoned place of the antenna, from any origin
+  Eigen::Matrix2d covariance;  ///< m^2, as declared
+  Eigen::Vector2d place;       ///< m, the dead-reckoned place
+  double walk_m2{0.0};         ///< m^2 per axis, variance of the dead reckoning but for what heading_sigma_rad makes
+  double heading_sigma_rad{0.0};
+  double time_s{0.0};
+};
+
 /// What a fix is worth: the covariance that its receiver declares follows its errors up and down, but is too small
 /// or too large by a factor, which is learnt, and errors are correlated in time.
 ///
@@ -34,32 +46,44 @@ struct FixNoiseModelParameters {
 /// Robbins and Monro 1951). Outliers, however far, weigh no more than others, and the half of the fixes that are the
 /// worst of all may be anything.
 ///
+/// A receiver that smooths takes a filter along: the innovations stay small, and the factor learnt from them falls
+/// without end. Two fixes that are farther apart than it smooths, and the odometry between them, still tell its errors.
+///
 /// Fixes with an error that is a first-order Markov process are together worth as much as independent ones whose
 /// covariance is (1 + a) / (1 - a) times as large, a = exp(-interval / correlation time).
 class FixNoiseModel {
  public:
-  /// Requires parameters without faults.
-  explicit FixNoiseModel(const FixNoiseModelParameters& parameters) : parameters_(parameters) {}
+  /// Requires parameters without faults. `lag_s`: how far apart fixes are compared; 0: they are not.
+  explicit FixNoiseModel(const FixNoiseModelParameters& parameters, double lag_s = 0.0)
+      : parameters_(parameters), lag_s_(lag_s) {}
 
   /// Forgets everything, the factor too: a filter that starts anew gives the same again.
   void reset();
   /// Odometry since the last fix: whether the robot stands.
   void move(const Twist2& twist, double duration_s);
 
-  double scale() const { return scale_; }
+  double scale() const { return std::max(scale_, lagged_scale_); }
   /// Factor on the covariance of a fix at `time_s` by which correlation lowers its worth, at least 1.
   double correlation_inflation(double time_s) const;
 
   /// The fix at `time_s` was used, with a share `exceeding` (0 to 1) of the innovation's NIS, at k times the declared
   /// covariance, beyond kMedianNis.
   void learn(double time_s, double exceeding);
+  /// Compares the fix with that of the lag before: learns a second factor, from differences of which a filter that
+  /// follows its fixes knows nothing. The larger of the two counts.
+  void compare(const DeadReckonedFix& fix);
 
   /// Median of the chi-squared distribution of 2 degrees of freedom.
   static constexpr double kMedianNis = 1.3862943611198906;
 
  private:
   FixNoiseModelParameters parameters_;
+  double lag_s_;
+  double changed(double scale, double exceeding) const;
+
   double scale_{1.0};
+  double lagged_scale_{0.0};  ///< 0: nothing known
+  std::deque<DeadReckonedFix> fixes_;
   std::optional<double> last_s_;
   double moved_m_{0.0};
   double elapsed_s_{0.0};

@@ -16,6 +16,11 @@ struct ImmEkfParameters {
   FixNoiseModelParameters noise;
   BiasModeParameters modes;
   OdometryErrorParameters odometry;
+  double yaw_rate_scale_sigma{0.005};  ///< standard deviation of the odometry's relative yaw-rate error, a constant
+  double fix_scale_lag{8.0};           ///< s apart at which fixes are compared with the odometry between them; 0: never
+  /// m per axis, of the error that fixes share for long (orbits, atmosphere), as far as they declare as much. No filter
+  /// sees it: it is added to the covariance of the estimate
+  double common_error_sigma{0.7};
 
   template <class V>
   void visit(V& v) {
@@ -23,6 +28,9 @@ struct ImmEkfParameters {
     noise.visit(v);
     modes.visit(v);
     odometry.visit(v);
+    v("yaw_rate_scale_sigma", yaw_rate_scale_sigma, non_negative());
+    v("fix_scale_lag", fix_scale_lag, non_negative());
+    v("common_error_sigma", common_error_sigma, non_negative());
   }
   void check(std::vector<std::string>&) const {}
 };
@@ -30,16 +38,17 @@ struct ImmEkfParameters {
 /// The switching bias as an interacting multiple model (Blom and Bar-Shalom 1988): one extended Kalman filter for each
 /// mode of a fix, mixed by matching moments at each fix.
 ///
-/// Each filter's state is (x, y, yaw, s, w, b_x, b_y): pose, relative error of the odometry's speed, error of its yaw
-/// rate, bias of the fixes. In the direct mode the bias is 0. At a fix, the modes before it are mixed into those that
-/// can go on from them (mode_transition(), predict_bias()); each takes the fix with its own noise; its probability is
-/// multiplied by the fix's likelihood. A fix is an outlier with outlier_share: then it is anywhere, and says nothing.
-/// Each mode weighs that in, and a jump is a slow bias once the fix is taken.
+/// Each filter's state is (x, y, yaw, s, w, a, b_x, b_y): pose, relative error of the odometry's speed, constant and
+/// relative error of its yaw rate, bias of the fixes. In the direct mode the bias is 0. At a fix, the modes before it
+/// are mixed into those that can go on from them (mode_transition(), predict_bias()); each takes the fix with its own
+/// noise; its probability is multiplied by the fix's likelihood. A fix is an outlier with outlier_share: then it is
+/// anywhere, and says nothing. Each mode weighs that in, and a jump is a slow bias once the fix is taken.
 ///
 /// Input that is not finite changes nothing.
 class ImmEkf : public Localizer {
  public:
-  static constexpr int kDimension = kErrorStates + 2;
+  static constexpr int kMotionStates = kErrorStates + 1;
+  static constexpr int kDimension = kMotionStates + 2;
   using State = Eigen::Matrix<double, kDimension, 1>;
   using Covariance = Eigen::Matrix<double, kDimension, kDimension>;
 
@@ -82,6 +91,8 @@ class ImmEkf : public Localizer {
     double log_weight{0.0};  ///< of the fix, without the prior
   };
   Gaussian mixed_into(BiasMode to, const ModeTransition& transition, double elapsed_s) const;
+  /// Lets the noise model see the fix beside the odometry alone; `before` is the mixture before the fix.
+  void compare_with_odometry(const FixMeasurement& fix, const Gaussian& before);
   /// Takes the fix; returns its NIS. `outlier` becomes the posterior probability that it is one.
   double update(BiasMode mode, const FixMeasurement& fix, Continuation& continuation, double& outlier,
                 double& white_nis) const;
@@ -94,7 +105,9 @@ class ImmEkf : public Localizer {
   ModeProbabilities probability_{ModeProbabilities::Zero()};
   double bias_odds_{1.0};
   std::optional<double> last_fix_s_;
-  double moved_s_{0.0};  ///< of odometry since the start
+  double moved_s_{0.0};                                   ///< of odometry since the start
+  Eigen::Vector2d corrections_{Eigen::Vector2d::Zero()};  ///< m, what fixes have moved the position by since the start
+  double common_variance_m2_{0.0};
 };
 
 }  // namespace urban_gnss

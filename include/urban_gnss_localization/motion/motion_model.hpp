@@ -99,16 +99,19 @@ inline MotionNoise draw_motion_noise(RandomEngine& engine) {
   return noise;
 }
 
-/// What the odometry is wrong by: true speed = (1 + speed_scale) measured, true yaw rate = measured + yaw_rate_bias.
+/// What the odometry is wrong by: true speed = (1 + speed_scale) measured, true yaw rate = (1 + yaw_rate_scale)
+/// measured
+/// + yaw_rate_bias.
 struct OdometryErrors {
   double speed_scale{0.0};          ///< 1
   double yaw_rate_bias_radps{0.0};  ///< rad/s
+  double yaw_rate_scale{0.0};       ///< 1
 };
 
 /// The measured twist, freed of its errors.
 inline Twist2 corrected(const Twist2& measured, const OdometryErrors& errors) {
   return {measured.speed_mps + errors.speed_scale * measured.speed_mps,
-          measured.yaw_rate_radps + errors.yaw_rate_bias_radps};
+          measured.yaw_rate_radps + errors.yaw_rate_scale * measured.yaw_rate_radps + errors.yaw_rate_bias_radps};
 }
 
 /// Eq. (5)-(8): one noisy step of one pose, whose noise-free part is the corrected twist. The particle filter's array
