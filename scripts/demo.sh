@@ -61,9 +61,11 @@ export ROS_MASTER_URI=http://localhost:$port ROS_HOME=$scratch
 unset ROS_LOG_DIR
 
 # Whatever was started below, also what roslaunch has put into process groups of their own: all know the master.
-our_processes() {
-  env -u ROS_MASTER_URI grep -lszxF "ROS_MASTER_URI=$ROS_MASTER_URI" /proc/[0-9]*/environ | cut -d / -f 3 || true
-}
+# What looks for them must not know it, neither grep nor cut.
+our_processes() (
+  export -n ROS_MASTER_URI
+  grep -lszxF "ROS_MASTER_URI=$ROS_MASTER_URI" /proc/[0-9]*/environ | cut -d / -f 3 || true
+)
 
 signal_until_gone() {
   local signal=$1 tries=$2 processes
