@@ -13,6 +13,12 @@ constexpr double kMostInflation = 1e6;
 
 }  // namespace
 
+double markov_inflation(double interval_s, double correlation_time_s) {
+  if (correlation_time_s <= 0.0) return 1.0;
+  const double ratio = std::max(interval_s, 0.0) / correlation_time_s;
+  return std::min(1.0 / std::tanh(0.5 * ratio), kMostInflation);
+}
+
 void FixNoiseModel::reset() {
   scale_ = 1.0;
   lagged_scale_ = 0.0;
@@ -30,9 +36,7 @@ void FixNoiseModel::move(const Twist2& twist, double duration_s) {
 double FixNoiseModel::correlation_inflation(double time_s) const {
   const bool is_parked = elapsed_s_ > 0.0 && moved_m_ < kParked_mps * elapsed_s_;
   const double correlation_s = is_parked ? parameters_.parked_correlation_time : parameters_.fix_correlation_time;
-  if (!last_s_ || correlation_s <= 0.0) return 1.0;
-  const double ratio = std::max(time_s - *last_s_, 0.0) / correlation_s;
-  return std::min(1.0 / std::tanh(0.5 * ratio), kMostInflation);  // (1 + a) / (1 - a)
+  return last_s_ ? markov_inflation(time_s - *last_s_, correlation_s) : 1.0;
 }
 
 double FixNoiseModel::changed(double scale, double exceeding) const {

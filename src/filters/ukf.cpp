@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "urban_gnss_localization/filters/dead_reckoning.hpp"
+#include "urban_gnss_localization/filters/fix_noise_model.hpp"
 #include "urban_gnss_localization/gnss/chi_squared.hpp"
 
 namespace urban_gnss {
@@ -18,7 +19,6 @@ constexpr int kAugmented = Ukf::kDimension + kNoise;
 constexpr int kYaw = 2;
 
 constexpr double kUnknownYawVariance = kPi * kPi / 3.0;
-constexpr double kMaxInflation = 1e6;
 
 /// g of eq. (1): the pose after one step of odometry, freed of the errors that the state holds.
 Pose2 moved(const Ukf::State& state, const MotionStep& step, const MotionNoise& noise) {
@@ -181,9 +181,7 @@ FixVerdict Ukf::correct(const FixMeasurement& fix) {
 }
 
 double Ukf::correlation_inflation(double time_s) const {
-  if (!last_used_s_ || parameters_.fix_correlation_time <= 0.0) return 1.0;
-  const double ratio = std::max(time_s - *last_used_s_, 0.0) / parameters_.fix_correlation_time;
-  return std::min(1.0 / std::tanh(0.5 * ratio), kMaxInflation);  // (1 + a) / (1 - a) for a = exp(-ratio)
+  return last_used_s_ ? markov_inflation(time_s - *last_used_s_, parameters_.fix_correlation_time) : 1.0;
 }
 
 bool Ukf::is_settled_by_gate(const FixMeasurement& fix, const Eigen::Vector2d& innovation, FixVerdict& verdict) {

@@ -38,6 +38,11 @@ struct DeadReckonedFix {
   double time_s{0.0};
 };
 
+/// Factor, 1 to 10^6, on the covariance of a fix `interval_s` after the last one, whose error is a first-order Markov
+/// process: with it, fixes are together worth as much as independent ones, (1 + a) / (1 - a), a = exp(-interval /
+/// correlation time). 1 where correlation_time_s is not positive.
+double markov_inflation(double interval_s, double correlation_time_s);
+
 /// What a fix is worth: the covariance that its receiver declares follows its errors up and down, but is too small
 /// or too large by a factor, which is learnt, and errors are correlated in time.
 ///
@@ -49,8 +54,7 @@ struct DeadReckonedFix {
 /// A receiver that smooths takes a filter along: the innovations stay small, and the factor learnt from them falls
 /// without end. Two fixes that are farther apart than it smooths, and the odometry between them, still tell its errors.
 ///
-/// Fixes with an error that is a first-order Markov process are together worth as much as independent ones whose
-/// covariance is (1 + a) / (1 - a) times as large, a = exp(-interval / correlation time).
+/// That errors are correlated is markov_inflation().
 class FixNoiseModel {
  public:
   /// Requires parameters without faults. `lag_s`: how far apart fixes are compared; 0: they are not.
