@@ -5,14 +5,12 @@
 
 #include <CLI/CLI.hpp>
 #include <array>
-#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <exception>
 #include <filesystem>
 #include <iomanip>
 #include <iostream>
-#include <mutex>
 #include <nlohmann/json.hpp>
 #include <sstream>
 #include <thread>
@@ -20,7 +18,7 @@
 #include "find_scenario.hpp"
 #include "output_file.hpp"
 #include "overrides.hpp"
-#include "urban_gnss_localization/common/progress.hpp"
+#include "parallel_jobs.hpp"
 #include "urban_gnss_localization/evaluation/report_json.hpp"
 #include "urban_gnss_localization/evaluation/statistics.hpp"
 #include "urban_gnss_localization/evaluation/trajectory_errors.hpp"
@@ -188,38 +186,20 @@ void run_all(const Options& options, const std::string& command) {
   BiasExperimentConditions conditions;
   read_overrides("--set", {}, options.overrides, conditions.filter, conditions.localization);
   const auto seeds = static_cast<std::size_t>(options.seeds);
-  const std::size_t total = options.scenarios.size() * seeds;
   std::vector<std::vector<BiasRun>> results(options.scenarios.size(), std::vector<BiasRun>(seeds));
-  std::atomic<std::size_t> next{0};
-  std::size_t done = 0;
-  std::mutex mutex;
-  std::exception_ptr failure;
-  Progress progress(total, "drives");
   const auto start = std::chrono::steady_clock::now();
-  const auto work = [&] {
-    for (std::size_t job = next++; job < total; job = next++) {
-      const std::size_t i = job / seeds;
-      const std::size_t s = job % seeds;
-      try {
-        std::vector<std::string> overrides = options.scenario_overrides;
-        overrides.push_back("seed=" + std::to_string(options.first_seed + static_cast<int>(s)));
-        overrides.push_back("lidar.type=none");
-        const Scenario scenario = load_scenario(find_scenario(options.scenarios[i]).string(), overrides);
-        results[i][s] = run_bias_experiment(scenario, conditions);
-      } catch (...) {
-        const std::lock_guard<std::mutex> lock(mutex);
-        failure = std::current_exception();
-        next = total;
-      }
-      const std::lock_guard<std::mutex> lock(mutex);
-      progress.report(++done, options.scenarios[i]);
-    }
-  };
-  std::vector<std::thread> threads;
-  for (int i = 0; i < options.jobs; ++i) threads.emplace_back(work);
-  for (std::thread& thread : threads) thread.join();
-  progress.finish();
-  if (failure) std::rethrow_exception(failure);
+  const auto label = [&](std::size_t index) { return options.scenarios[index / seeds]; };
+  run_jobs(results.size() * seeds, options.jobs, label,
+           [&](std::size_t index, const std::function<void(double)>& on_progress) {
+             const std::size_t i = index / seeds;
+             const std::size_t s = index % seeds;
+             std::vector<std::string> overrides = options.scenario_overrides;
+             overrides.push_back("seed=" + std::to_string(options.first_seed + static_cast<int>(s)));
+             overrides.push_back("lidar.type=none");
+             const Scenario scenario = load_scenario(find_scenario(options.scenarios[i]).string(), overrides);
+             results[i][s] = run_bias_experiment(scenario, conditions);
+             on_progress(1.0);
+           });
 
   nlohmann::json metrics;
   metrics["command"] = command;

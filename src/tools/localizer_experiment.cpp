@@ -169,15 +169,17 @@ void run_all(const Options& options, const std::string& command) {
   const auto seeds = static_cast<std::size_t>(options.seeds);
   std::vector<std::vector<LocalizerRun>> runs(options.scenarios.size(), std::vector<LocalizerRun>(seeds));
   const auto start = std::chrono::steady_clock::now();
-  run_jobs(runs.size() * seeds, options.jobs, [&](std::size_t index, const std::function<void(double)>& on_progress) {
-    const std::size_t i = index / seeds;
-    const std::size_t s = index % seeds;
-    std::vector<std::string> overrides = options.scenario_overrides;
-    overrides.push_back("seed=" + std::to_string(options.first_seed + static_cast<int>(s)));
-    if (options.duration_s > 0.0) overrides.push_back("duration=" + std::to_string(options.duration_s));
-    const Scenario scenario = load_scenario(find_scenario(options.scenarios[i]).string(), overrides);
-    runs[i][s] = run_localizer_experiment(scenario, contenders, settings.conditions, on_progress);
-  });
+  const auto label = [&](std::size_t index) { return options.scenarios[index / seeds]; };
+  run_jobs(runs.size() * seeds, options.jobs, label,
+           [&](std::size_t index, const std::function<void(double)>& on_progress) {
+             const std::size_t i = index / seeds;
+             const std::size_t s = index % seeds;
+             std::vector<std::string> overrides = options.scenario_overrides;
+             overrides.push_back("seed=" + std::to_string(options.first_seed + static_cast<int>(s)));
+             if (options.duration_s > 0.0) overrides.push_back("duration=" + std::to_string(options.duration_s));
+             const Scenario scenario = load_scenario(find_scenario(options.scenarios[i]).string(), overrides);
+             runs[i][s] = run_localizer_experiment(scenario, contenders, settings.conditions, on_progress);
+           });
 
   nlohmann::json metrics;
   metrics["command"] = command;

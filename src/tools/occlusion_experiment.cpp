@@ -5,14 +5,12 @@
 
 #include <CLI/CLI.hpp>
 #include <Eigen/LU>
-#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <exception>
 #include <filesystem>
 #include <iomanip>
 #include <iostream>
-#include <mutex>
 #include <nlohmann/json.hpp>
 #include <sstream>
 #include <thread>
@@ -21,7 +19,7 @@
 #include "occlusion_series.hpp"
 #include "output_file.hpp"
 #include "overrides.hpp"
-#include "urban_gnss_localization/common/progress.hpp"
+#include "parallel_jobs.hpp"
 #include "urban_gnss_localization/evaluation/report_json.hpp"
 #include "urban_gnss_localization/evaluation/statistics.hpp"
 #include "urban_gnss_localization/geometry/angles.hpp"
@@ -241,42 +239,19 @@ void print(const std::string& scenario, const nlohmann::json& json) {
 void run_all(const Options& options, const std::string& command) {
   const OcclusionExperimentConditions conditions = read_conditions(options);
   const auto seeds = static_cast<std::size_t>(options.seeds);
-  const std::size_t total = options.scenarios.size() * seeds;
   std::vector<std::vector<OcclusionRun>> results(options.scenarios.size(), std::vector<OcclusionRun>(seeds));
-  std::vector<double> shares(total, 0.0);
-  std::atomic<std::size_t> next{0};
-  std::mutex mutex;
-  std::exception_ptr failure;
-  Progress progress(1000, "per mille");
   const auto start = std::chrono::steady_clock::now();
-  const auto work = [&] {
-    for (std::size_t job = next++; job < total; job = next++) {
-      const std::size_t i = job / seeds;
-      const std::size_t s = job % seeds;
-      try {
-        std::vector<std::string> overrides = options.scenario_overrides;
-        overrides.push_back("seed=" + std::to_string(options.first_seed + static_cast<int>(s)));
-        if (options.duration_s > 0.0) overrides.push_back("duration=" + std::to_string(options.duration_s));
-        const Scenario scenario = load_scenario(find_scenario(options.scenarios[i]).string(), overrides);
-        results[i][s] = run_occlusion_experiment(scenario, conditions, [&](double share) {
-          const std::lock_guard<std::mutex> lock(mutex);
-          shares[job] = share;
-          double sum = 0.0;
-          for (const double each : shares) sum += each;
-          progress.report(static_cast<std::size_t>(1000.0 * sum / static_cast<double>(total)), options.scenarios[i]);
-        });
-      } catch (...) {
-        const std::lock_guard<std::mutex> lock(mutex);
-        failure = std::current_exception();
-        next = total;
-      }
-    }
-  };
-  std::vector<std::thread> threads;
-  for (int i = 0; i < options.jobs; ++i) threads.emplace_back(work);
-  for (std::thread& thread : threads) thread.join();
-  progress.finish();
-  if (failure) std::rethrow_exception(failure);
+  const auto label = [&](std::size_t index) { return options.scenarios[index / seeds]; };
+  run_jobs(results.size() * seeds, options.jobs, label,
+           [&](std::size_t index, const std::function<void(double)>& on_progress) {
+             const std::size_t i = index / seeds;
+             const std::size_t s = index % seeds;
+             std::vector<std::string> overrides = options.scenario_overrides;
+             overrides.push_back("seed=" + std::to_string(options.first_seed + static_cast<int>(s)));
+             if (options.duration_s > 0.0) overrides.push_back("duration=" + std::to_string(options.duration_s));
+             const Scenario scenario = load_scenario(find_scenario(options.scenarios[i]).string(), overrides);
+             results[i][s] = run_occlusion_experiment(scenario, conditions, on_progress);
+           });
 
   nlohmann::json metrics;
   metrics["command"] = command;

@@ -13,9 +13,10 @@
 
 namespace urban_gnss {
 
-/// Does `total` jobs in `threads` threads, and shows on standard error how far they are. A job is given its index and a
-/// function to be told the share of it that is done, 0 to 1. The first exception ends the work and is thrown again.
-inline void run_jobs(std::size_t total, int threads,
+/// Does `total` jobs in `threads` threads, and shows on standard error how far they are and what `label` calls the job
+/// that came on last. A job is given its index and a function to be told the share of it that is done, 0 to 1. The
+/// first exception ends the work and is thrown again.
+inline void run_jobs(std::size_t total, int threads, const std::function<std::string(std::size_t)>& label,
                      const std::function<void(std::size_t, const std::function<void(double)>&)>& job) {
   constexpr std::size_t kSteps = 1000;
   Progress progress(kSteps, "per mille");
@@ -31,7 +32,8 @@ inline void run_jobs(std::size_t total, int threads,
           shares[index] = share;
           double sum = 0.0;
           for (const double each : shares) sum += each;
-          progress.report(static_cast<std::size_t>(static_cast<double>(kSteps) * sum / static_cast<double>(total)));
+          progress.report(static_cast<std::size_t>(static_cast<double>(kSteps) * sum / static_cast<double>(total)),
+                          label(index));
         });
       } catch (...) {
         const std::lock_guard<std::mutex> lock(mutex);
