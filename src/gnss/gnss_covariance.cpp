@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numeric>
+#include <set>
 
 #include "urban_gnss_localization/geometry/angles.hpp"
 #include "urban_gnss_localization/gnss/dilution_of_precision.hpp"
@@ -12,6 +14,9 @@ namespace urban_gnss {
 namespace {
 
 constexpr double kReferenceSine = 0.6;  ///< of the elevation, 37 degrees
+constexpr double kReferenceCotangent = 4.0 / 3.0;
+const double kReferenceElevation_rad = std::asin(kReferenceSine);
+constexpr double kLowestElevation_rad = 15.0 * kPi / 180.0;  ///< from which reflections grow no more
 constexpr double kMaxCn0_dbhz = 70.0;
 constexpr double kMaxLogOdds = 30.0;
 
@@ -65,11 +70,25 @@ double receiver_weight(const SatelliteObservation& satellite, const GnssCovarian
   return std::clamp(weight, parameters.weight_floor, 1.0);
 }
 
-/// Variance of the error of a range that is reflected with probability p.
-double range_variance(double p, const GnssCovarianceParameters& parameters) {
-  const double direct = parameters.sigma_ure * parameters.sigma_ure;
-  const double reflected = parameters.nlos_sigma * parameters.nlos_sigma;
-  return (1.0 - p) * direct + p * reflected + p * (1.0 - p) * parameters.nlos_mean * parameters.nlos_mean;
+/// Error of a range.
+struct RangeError {
+  double mean_m;
+  double variance_m2;
+};
+
+/// Of one that is reflected with probability p, where reflections are `scale` times as large as the parameters say.
+RangeError range_error(double p, double scale, const GnssCovarianceParameters& parameters) {
+  const double mean_m = scale * parameters.nlos_mean;
+  const double sigma_m = std::max(scale * parameters.nlos_sigma, parameters.sigma_ure);
+  const double direct_m2 = parameters.sigma_ure * parameters.sigma_ure;
+  return {p * mean_m, (1.0 - p) * direct_m2 + p * sigma_m * sigma_m + p * (1.0 - p) * mean_m * mean_m};
+}
+
+/// How large reflections from this elevation are against the parameters, where this share of the satellites is hidden.
+double nlos_scale(double elevation_rad, double hidden_share, const GnssCovarianceParameters& parameters) {
+  const double cotangent = std::max(0.0, 1.0 / std::tan(std::max(elevation_rad, kLowestElevation_rad)));
+  return std::pow(hidden_share, parameters.nlos_hidden_exponent) *
+         std::pow(cotangent / kReferenceCotangent, parameters.nlos_elevation_exponent);
 }
 
 int clock_of(const SatelliteId& id) {
@@ -108,6 +127,18 @@ std::vector<std::size_t> used_satellites(const std::vector<SatelliteObservation>
   return used;
 }
 
+/// Of the satellites in the list, received or not, the share that probably has no line of sight.
+double hidden_share(const std::vector<SatelliteObservation>& satellites,
+                    const std::vector<double>& nlos_probabilities) {
+  std::set<SatelliteId> in_view;
+  for (const SatelliteObservation& satellite : satellites) {
+    if (has_direction(satellite)) in_view.insert(satellite.id);
+  }
+  const double hidden = std::accumulate(nlos_probabilities.begin(), nlos_probabilities.end(), 0.0);
+  const double seen = static_cast<double>(nlos_probabilities.size()) - hidden;
+  return std::max(0.0, 1.0 - seen / static_cast<double>(std::max(in_view.size(), nlos_probabilities.size())));
+}
+
 std::vector<RangingSatellite> ranging(const std::vector<SatelliteObservation>& satellites,
                                       const std::vector<std::size_t>& which) {
   std::vector<RangingSatellite> result;
@@ -128,8 +159,7 @@ struct SoftError {
 
 /// Nothing where the geometry does not determine the position.
 std::optional<SoftError> soft_error(const std::vector<RangingSatellite>& satellites,
-                                    const std::vector<double>& nlos_probabilities,
-                                    const GnssCovarianceParameters& parameters) {
+                                    const std::vector<RangeError>& errors) {
   if (!dilution_of_precision(satellites)) return std::nullopt;
   std::map<int, Eigen::Index> clocks;
   for (const RangingSatellite& satellite : satellites) {
@@ -145,8 +175,8 @@ std::optional<SoftError> soft_error(const std::vector<RangingSatellite>& satelli
     h.row(i).head<3>() = satellites[k].line_of_sight;
     h(i, clocks.at(satellites[k].clock)) = 1.0;
     weight[i] = satellites[k].weight;
-    mean[i] = nlos_probabilities[k] * parameters.nlos_mean;
-    variance[i] = range_variance(nlos_probabilities[k], parameters);
+    mean[i] = errors[k].mean_m;
+    variance[i] = errors[k].variance_m2;
   }
   const Eigen::MatrixXd weighted = weight.asDiagonal() * h;
   const Eigen::MatrixXd normal = h.transpose() * weighted;
@@ -184,10 +214,11 @@ void without_satellites(const std::optional<SkyObservation>& sky, const std::opt
   if (rays.unknown >= 1.0) return;
   result.source = VisibilitySource::kLidar;
   if (parameters.model == CovarianceModel::kConventional) return;
-  const double direct = parameters.sigma_ure * parameters.sigma_ure;
-  const double added =
-      range_variance(nlos_by_map(rays, parameters), parameters) - range_variance(parameters.nlos_if_free, parameters);
-  result.model *= 1.0 + std::max(added, 0.0) / direct;
+  const auto variance_m2 = [&](double p) {  // of a satellite in a sky of which the share p is hidden
+    return range_error(p, nlos_scale(kReferenceElevation_rad, p, parameters), parameters).variance_m2;
+  };
+  const double added_m2 = variance_m2(nlos_by_map(rays, parameters)) - variance_m2(parameters.nlos_if_free);
+  result.model *= 1.0 + std::max(added_m2, 0.0) / (parameters.sigma_ure * parameters.sigma_ure);
 }
 
 void with_satellites(const std::vector<SatelliteObservation>& satellites, const std::vector<std::size_t>& used,
@@ -223,8 +254,15 @@ void with_satellites(const std::vector<SatelliteObservation>& satellites, const 
     case CovarianceModel::kConventional: result.model = result.conventional; break;
     case CovarianceModel::kPaper: result.model = covariance_of(dop_visible, parameters); break;
     case CovarianceModel::kSoft: {
-      for (std::size_t k = 0; k < used.size(); ++k) all[k].weight = receiver_weight(satellites[used[k]], parameters);
-      const auto error = soft_error(all, probabilities, parameters);
+      const double hidden = hidden_share(satellites, probabilities);
+      std::vector<RangeError> errors;
+      for (std::size_t k = 0; k < used.size(); ++k) {
+        const SatelliteObservation& satellite = satellites[used[k]];
+        all[k].weight = receiver_weight(satellite, parameters);
+        const double scale = nlos_scale(satellite.look.elevation_rad, hidden, parameters);
+        errors.push_back(range_error(probabilities[k], scale, parameters));
+      }
+      const auto error = soft_error(all, errors);
       result.model = error ? error->second_moment() : parameters.filter.infinite();
       if (error) result.bias = error->mean;
       break;

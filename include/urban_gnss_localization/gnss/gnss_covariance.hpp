@@ -42,16 +42,18 @@ struct GnssCovarianceParameters {
   bool allow_smaller{false};      ///< than what the receiver claims
   double assumed_hdop{1.2};       ///< where neither the receiver nor satellites tell
   ReceiverWeighting receiver_weighting{ReceiverWeighting::kCn0};
-  double weight_cn0{40.0};      ///< dB-Hz, from here on the receiver weighs ranges equally
-  double weight_floor{0.01};    ///< least weight of a range, of 1
-  double nlos_mean{25.0};       ///< m, of the range error without line of sight
-  double nlos_sigma{25.0};      ///< m, about that mean
-  double nlos_cn0{28.0};        ///< dB-Hz, at which a signal at 37 degrees is as likely reflected as direct
-  double nlos_cn0_width{3.0};   ///< dB, that change the odds by e
-  double nlos_cn0_rise{-4.5};   ///< dB, by which nlos_cn0 rises from the horizon to the zenith
-  double nlos_if_blocked{0.9};  ///< probability of no line of sight where the map blocks it,
-  double nlos_if_free{0.005};   ///< where the map shows free space,
-  double nlos_if_unknown{0.1};  ///< and where it shows nothing
+  double weight_cn0{40.0};              ///< dB-Hz, from here on the receiver weighs ranges equally
+  double weight_floor{0.01};            ///< least weight of a range, of 1
+  double nlos_mean{25.0};               ///< m, of the range error without line of sight
+  double nlos_sigma{25.0};              ///< m, about that mean
+  double nlos_hidden_exponent{0.0};     ///< both grow with this power of the hidden share of the satellites in view,
+  double nlos_elevation_exponent{0.0};  ///< and with this power of the cotangent of the elevation, 1 at 37 degrees
+  double nlos_cn0{28.0};                ///< dB-Hz, at which a signal at 37 degrees is as likely reflected as direct
+  double nlos_cn0_width{3.0};           ///< dB, that change the odds by e
+  double nlos_cn0_rise{-4.5};           ///< dB, by which nlos_cn0 rises from the horizon to the zenith
+  double nlos_if_blocked{0.9};          ///< probability of no line of sight where the map blocks it,
+  double nlos_if_free{0.005};           ///< where the map shows free space,
+  double nlos_if_unknown{0.1};          ///< and where it shows nothing
   ReceiverMemoryParameters memory;
   CovarianceFilterParameters filter;
 
@@ -67,6 +69,8 @@ struct GnssCovarianceParameters {
     v("weight_floor", weight_floor, between(1e-6, 1.0));
     v("nlos_mean", nlos_mean, non_negative());
     v("nlos_sigma", nlos_sigma, positive());
+    v("nlos_hidden_exponent", nlos_hidden_exponent, between(0.0, 5.0));
+    v("nlos_elevation_exponent", nlos_elevation_exponent, between(0.0, 5.0));
     v("nlos_cn0", nlos_cn0, between(0.0, 70.0));
     v("nlos_cn0_width", nlos_cn0_width, positive());
     v("nlos_cn0_rise", nlos_cn0_rise, between(-30.0, 30.0));
@@ -130,10 +134,16 @@ struct GnssCovariance {
 /// The soft model. The receiver's fix is x = K z with K = (H^T W H)^-1 H^T W and *its* weights W, equal or by C/N0 (the
 /// variance of a range is proportional to 10^(-C/N0 / 10); Hartinger and Brunner 1999). It does not know which signals
 /// are reflected. A range that is reflected with probability p_i has an error with
-///   mean m_i = p_i mu,   variance v_i = (1 - p_i) sigma_URE^2 + p_i sigma_nlos^2 + p_i (1 - p_i) mu^2,
-/// mu = nlos_mean, sigma_nlos = nlos_sigma; independent of the others, given the p_i. The second moment of the fix's
-/// error is thus
+///   mean m_i = p_i mu_i,   variance v_i = (1 - p_i) sigma_URE^2 + p_i sigma_i^2 + p_i (1 - p_i) mu_i^2,
+/// independent of the others, given the p_i. The second moment of the fix's error is thus
 ///   C = K (diag(v) + m m^T) K^T.
+/// mu_i = s_i nlos_mean and sigma_i = max(s_i nlos_sigma, sigma_URE). A signal that comes over the roofs goes on
+/// between the walls for a way that is proportional to cot e, and the more of the sky is hidden, the more walls turn it
+/// on:
+///   s_i = h^nlos_hidden_exponent (cot e_i / cot 37 deg)^nlos_elevation_exponent,
+/// h the expected share without line of sight of the satellites in view (those of the list above the horizon; one that
+/// is not received has none), e_i not below 15 degrees, whence the way is limited by the walls' length. With exponents
+/// of 0, all reflections are alike.
 /// A delay that all ranges of a constellation share goes into its clock, not into C. With p = 0 and equal weights, C is
 /// eq. (4). It is a continuous function of every blocked fraction and C/N0.
 ///
