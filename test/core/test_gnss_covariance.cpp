@@ -54,8 +54,6 @@ TEST(GnssCovariance, PaperLeavesBlockedSatellitesOut) {
   EXPECT_EQ(result.source, VisibilitySource::kLidar);
 }
 
-// The derivation in the header, checked by drawing errors of ranges and solving for the fix.
-
 TEST(GnssCovariance, TooFewVisibleSatellitesAreInfinite) {
   const Eigen::Matrix2d infinite = 360000.0 * Eigen::Matrix2d::Identity();
   for (std::size_t visible = 0; visible <= 9; ++visible) {
@@ -290,6 +288,8 @@ TEST(GnssCovariance, EveryParameterHasAnEffectF36) {
                                                                            {"weight_floor", {"soft", "0.1"}},
                                                                            {"nlos_mean", {"soft", "10.0"}},
                                                                            {"nlos_sigma", {"soft", "10.0"}},
+                                                                           {"nlos_hidden_exponent", {"soft", "1.0"}},
+                                                                           {"nlos_elevation_exponent", {"soft", "1.0"}},
                                                                            {"nlos_cn0", {"soft", "32.0"}},
                                                                            {"nlos_cn0_width", {"soft", "5.0"}},
                                                                            {"nlos_cn0_rise", {"soft", "0.0"}},

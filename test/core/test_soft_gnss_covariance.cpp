@@ -28,18 +28,31 @@ TEST(SoftGnssCovariance, SoftWithoutReflectionsAndEqualWeightsIsEquation4) {
   EXPECT_EQ(result.source, VisibilitySource::kLidarAndSatellites);
 }
 
-TEST(SoftGnssCovariance, SoftIsTheSecondMomentOfSimulatedFixes) {
+/// The header's derivation, checked by drawing errors of ranges and solving for the fix.
+void expect_second_moment_of_simulated_fixes(const GnssCovarianceParameters& p, int not_received) {
   RandomEngine engine = make_engine(1);
-  GnssCovarianceParameters p;
   Sky sky = open_sky();
   for (auto& s : sky) {
     s.cn0_dbhz = uniform_between(20, 45, engine);
     s.blocked_fraction = draw_uniform(engine);
     s.known_fraction = 1.0;
   }
-  const auto result = compute(sky, p);
+  Sky in_view = sky;
+  for (int i = 0; i < not_received; ++i) {
+    in_view.push_back(satellite(20 + i, 40.0 * i, 30.0));
+    in_view.back().tracked = false;
+  }
+  const auto result = compute(in_view, p);
 
   const auto count = static_cast<Eigen::Index>(sky.size());
+  double hidden = not_received;
+  for (std::size_t i = 0; i < sky.size(); ++i) hidden += result.satellites[i].nlos_probability;
+  const double hidden_share = hidden / static_cast<double>(in_view.size());
+  std::vector<double> scale;
+  for (const auto& s : sky) {
+    scale.push_back(std::pow(hidden_share, p.nlos_hidden_exponent) *
+                    std::pow(0.75 / std::tan(s.look.elevation_rad), p.nlos_elevation_exponent));
+  }
   Eigen::MatrixXd h(count, 4);
   Eigen::VectorXd weight(count);
   for (Eigen::Index i = 0; i < count; ++i) {
@@ -54,8 +67,10 @@ TEST(SoftGnssCovariance, SoftIsTheSecondMomentOfSimulatedFixes) {
   for (int draw = 0; draw < kDraws; ++draw) {
     Eigen::VectorXd error(count);
     for (Eigen::Index i = 0; i < count; ++i) {
-      const bool is_reflected = draw_uniform(engine) < result.satellites[static_cast<std::size_t>(i)].nlos_probability;
-      error[i] = is_reflected ? p.nlos_mean + p.nlos_sigma * draw_normal(engine) : p.sigma_ure * draw_normal(engine);
+      const auto k = static_cast<std::size_t>(i);
+      const bool is_reflected = draw_uniform(engine) < result.satellites[k].nlos_probability;
+      const double sigma = is_reflected ? std::max(scale[k] * p.nlos_sigma, p.sigma_ure) : p.sigma_ure;
+      error[i] = (is_reflected ? scale[k] * p.nlos_mean : 0.0) + sigma * draw_normal(engine);
     }
     const Eigen::Vector2d fix = (gain * error).head<2>();
     moment += fix * fix.transpose() / kDraws;
@@ -63,6 +78,70 @@ TEST(SoftGnssCovariance, SoftIsTheSecondMomentOfSimulatedFixes) {
   // Errors of 200 000 fourth moments: below 1 % (kurtosis under 10).
   EXPECT_TRUE(result.model.isApprox(moment, 0.03)) << result.model << "\n\n" << moment;
   EXPECT_GT(result.model.trace(), 4.0 * equation_4(sky, 3.75).trace());
+}
+
+TEST(SoftGnssCovariance, SoftIsTheSecondMomentOfSimulatedFixes) {
+  GnssCovarianceParameters p;
+  expect_second_moment_of_simulated_fixes(p, 0);
+  p.nlos_hidden_exponent = 0.7;
+  p.nlos_elevation_exponent = 1.2;
+  p.nlos_mean = 40.0;
+  expect_second_moment_of_simulated_fixes(p, 0);
+  expect_second_moment_of_simulated_fixes(p, 7);
+}
+
+TEST(SoftGnssCovariance, ReflectionsGrowWithTheHiddenShareIfToldSo) {
+  const auto sigma_with = [](int not_received, double exponent) {
+    GnssCovarianceParameters p;
+    p.nlos_hidden_exponent = exponent;
+    Sky sky = open_sky(42.0, 0.0);
+    sky[0].cn0_dbhz = 20.0;
+    sky[0].blocked_fraction = 1.0;
+    for (int i = 0; i < not_received; ++i) {
+      sky.push_back(satellite(20 + i, 30.0 * i, 45.0));
+      sky.back().tracked = false;
+    }
+    sky.push_back(satellite(40, 0.0, -5.0));  // not in view
+    sky.back().tracked = false;
+    return position_sigma(compute(sky, p).weighted);
+  };
+  for (int not_received = 1; not_received <= 12; ++not_received) {
+    EXPECT_GT(sigma_with(not_received, 1.0), sigma_with(not_received - 1, 1.0)) << not_received;
+    EXPECT_EQ(sigma_with(not_received, 0.0), sigma_with(0, 0.0)) << not_received;
+    EXPECT_LT(sigma_with(not_received, 1.0), sigma_with(not_received, 0.0)) << "as all were hidden";
+  }
+}
+
+TEST(SoftGnssCovariance, ReflectionsGrowTowardsTheHorizonIfToldSo) {
+  const auto growth = [](double elevation_deg) {  // of the error by one reflection, against an exponent of 0
+    const auto sigma_with = [&](double exponent) {
+      GnssCovarianceParameters p;
+      p.nlos_elevation_exponent = exponent;
+      Sky sky = open_sky(42.0, 0.0);
+      sky[0].look.elevation_rad = degrees_to_radians(elevation_deg);
+      sky[0].cn0_dbhz = 10.0;
+      sky[0].blocked_fraction = 1.0;
+      return position_sigma(compute(sky, p).weighted);
+    };
+    return sigma_with(1.5) / sigma_with(0.0);
+  };
+  EXPECT_NEAR(growth(radians_to_degrees(std::asin(0.6))), 1.0, 1e-3);
+  EXPECT_NEAR(growth(15.0), growth(5.0), 0.2) << "limited by the walls' length";
+  double last = growth(15.0);
+  EXPECT_GT(last, 1.5);
+  for (double elevation_deg = 20.0; elevation_deg <= 90.0; elevation_deg += 5.0) {
+    EXPECT_LE(growth(elevation_deg), last + 1e-9) << elevation_deg;
+    last = growth(elevation_deg);
+  }
+  EXPECT_LT(last, 1.0);
+}
+
+TEST(SoftGnssCovariance, OpenSkyHasNoReflectionsToGrow) {
+  GnssCovarianceParameters p;
+  const auto base = compute(open_sky(60.0, 0.0), p);
+  p.nlos_hidden_exponent = 2.0;
+  p.nlos_elevation_exponent = 2.0;
+  EXPECT_TRUE(compute(open_sky(60.0, 0.0), p).weighted.isApprox(base.weighted, 1e-2));
 }
 
 TEST(SoftGnssCovariance, DelayOfAllRangesGoesIntoTheClock) {
