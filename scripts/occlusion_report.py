@@ -146,26 +146,30 @@ def plot_figure5(path, fixes):
     common.save_figure(figure, path)
 
 
-def map_panels(scenarios):
-    """A figure with an axes of equal scales for each scenario."""
-    columns = min(2, len(scenarios))
-    rows = -(-len(scenarios) // columns)
-    figure, grid = plt.subplots(rows, columns, figsize=(5.6 * columns, 4.6 * rows), squeeze=False,
-                                constrained_layout=True)
-    for axes in grid.ravel()[len(scenarios):]:
-        axes.set_axis_off()
-    for axes, scenario in zip(grid.ravel(), scenarios):
+def map_panels(truths):
+    """A figure with an axes of equal scales for each scenario, two a row; of an odd number the flattest has its own."""
+    panel_width, panel_height, margin = 5.6, 4.6, 1.1  # inches
+    flatness = {s: np.ptp(t["x"]) / max(np.ptp(t["y"]), 1.0) if len(t) else 1.0 for s, t in truths.items()}
+    alone = [max(flatness, key=flatness.get)] if len(truths) % 2 else []
+    paired = [s for s in truths if s not in alone]
+    heights = [panel_height] * (len(paired) // 2)
+    heights += [min(panel_height, 2.0 * panel_width / flatness[s]) + margin for s in alone]
+    figure = plt.figure(figsize=(2.0 * panel_width, sum(heights)), constrained_layout=True)
+    grid = figure.add_gridspec(len(heights), 2, height_ratios=heights)
+    panels = {s: figure.add_subplot(grid[k // 2, k % 2]) for k, s in enumerate(paired)}
+    panels.update({s: figure.add_subplot(grid[-1, :]) for s in alone})
+    for scenario, axes in panels.items():
         axes.set_aspect("equal")
         axes.set_title(scenario, fontsize=10, loc="left")
         axes.set_xlabel("east [m]")
         axes.set_ylabel("north [m]")
         common.light_grid(axes)
-    return figure, dict(zip(scenarios, grid.ravel()))
+    return figure, panels
 
 
 def plot_figure6(path, fixes, truths):
     """The fixes, green where the soft model calls them good and red where bad, on the true trajectory."""
-    figure, panels = map_panels(list(fixes))
+    figure, panels = map_panels({s: truths[s] for s in fixes})
     for scenario, axes in panels.items():
         rows = fixes[scenario]
         axes.plot(truths[scenario]["x"], truths[scenario]["y"], color="#f0c000", linewidth=2.5, zorder=1,
@@ -182,7 +186,7 @@ def plot_figure6(path, fixes, truths):
 
 def plot_figure7(path, truths, estimates):
     """The trajectories of the UKF with the conventional and the soft covariances."""
-    figure, panels = map_panels(list(truths))
+    figure, panels = map_panels(truths)
     for scenario, axes in panels.items():
         axes.plot(truths[scenario]["x"], truths[scenario]["y"], color="#f0c000", linewidth=3.0, label="true trajectory")
         for model in ("conventional", "paper", "soft"):
