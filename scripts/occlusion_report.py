@@ -148,12 +148,12 @@ def plot_figure5(path, fixes):
 
 def map_panels(truths):
     """A figure with an axes of equal scales for each scenario, two a row; of an odd number the flattest has its own."""
-    panel_width, panel_height, margin = 5.6, 4.6, 1.1  # inches
+    panel_width, panel_height, margin = 5.6, 3.9, 0.8  # inches
     flatness = {s: np.ptp(t["x"]) / max(np.ptp(t["y"]), 1.0) if len(t) else 1.0 for s, t in truths.items()}
     alone = [max(flatness, key=flatness.get)] if len(truths) % 2 else []
     paired = [s for s in truths if s not in alone]
-    heights = [panel_height] * (len(paired) // 2)
-    heights += [min(panel_height, 2.0 * panel_width / flatness[s]) + margin for s in alone]
+    rows = [paired[k:k + 2] for k in range(0, len(paired), 2)] + ([alone] if alone else [])
+    heights = [margin + min(panel_height, max(2.0 * panel_width / len(row) / flatness[s] for s in row)) for row in rows]
     figure = plt.figure(figsize=(2.0 * panel_width, sum(heights)), constrained_layout=True)
     grid = figure.add_gridspec(len(heights), 2, height_ratios=heights)
     panels = {s: figure.add_subplot(grid[k // 2, k % 2]) for k, s in enumerate(paired)}
