@@ -10,6 +10,11 @@ namespace {
 /// Slower than this on average since the last fix, the robot stands.
 constexpr double kParked_mps = 0.05;
 constexpr double kMostInflation = 1e6;
+/// Weight of a fix in the mean of what fixes declare.
+constexpr double kMeanRate = 0.03;
+
+/// ln of the geometric mean of the variances along the ellipse's axes.
+double log_variance(const Eigen::Matrix2d& covariance) { return 0.5 * std::log(covariance.determinant()); }
 
 }  // namespace
 
@@ -21,6 +26,7 @@ double markov_inflation(double interval_s, double correlation_time_s) {
 
 void FixNoiseModel::reset() {
   scale_ = fresh_scale();
+  log_mean_variance_.reset();
   lagged_scale_.reset();
   fixes_.clear();
   last_s_.reset();
@@ -31,6 +37,13 @@ void FixNoiseModel::reset() {
 void FixNoiseModel::move(const Twist2& twist, double duration_s) {
   moved_m_ += std::abs(twist.speed_mps) * duration_s;
   elapsed_s_ += duration_s;
+}
+
+Eigen::Matrix2d FixNoiseModel::believed(const Eigen::Matrix2d& declared) {
+  const double now = log_variance(declared);
+  if (!log_mean_variance_) log_mean_variance_ = now;
+  *log_mean_variance_ += kMeanRate * (now - *log_mean_variance_);
+  return std::exp((parameters_.fix_covariance_weight - 1.0) * (now - *log_mean_variance_)) * declared;
 }
 
 double FixNoiseModel::correlation_inflation(double time_s) const {

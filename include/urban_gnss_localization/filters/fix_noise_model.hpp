@@ -15,6 +15,8 @@ namespace urban_gnss {
 struct FixNoiseModelParameters {
   /// 1, by how much a fix changes the logarithm of the factor on the declared covariance; 0: the factor stays 1
   double fix_scale_rate{0.03};
+  double first_fix_scale{2.0};           ///< factor on the declared covariance before anything is learnt
+  double fix_covariance_weight{0.5};     ///< 0 to 1, how far the declared covariance's ups and downs are believed
   double fix_scale_limit{20.0};          ///< factor by which declared standard deviations may be wrong, either way
   double fix_correlation_time{3.0};      ///< s, over which the error of a fix stays the same; 0: independent errors
   double parked_correlation_time{30.0};  ///< s, the same while the robot stands: reflections change little then (F34)
@@ -22,6 +24,8 @@ struct FixNoiseModelParameters {
   template <class V>
   void visit(V& v) {
     v("fix_scale_rate", fix_scale_rate, between(0.0, 1.0));
+    v("first_fix_scale", first_fix_scale, positive());
+    v("fix_covariance_weight", fix_covariance_weight, between(0.0, 1.0));
     v("fix_scale_limit", fix_scale_limit, at_least(1.0));
     v("fix_correlation_time", fix_correlation_time, non_negative());
     v("parked_correlation_time", parked_correlation_time, non_negative());
@@ -63,6 +67,9 @@ class FixNoiseModel {
   void move(const Twist2& twist, double duration_s);
 
   double scale() const { return lagged_scale_ ? std::max(scale_.value(), lagged_scale_->value()) : scale_.value(); }
+  /// The next fix declares `declared` (m^2, positive definite): as far as its ups and downs are believed. Its size is
+  /// drawn towards the geometric mean of those declared lately, by the power 1 - fix_covariance_weight.
+  Eigen::Matrix2d believed(const Eigen::Matrix2d& declared);
   /// Factor on the covariance of a fix at `time_s` by which correlation lowers its worth, at least 1.
   double correlation_inflation(double time_s) const;
 
@@ -75,8 +82,13 @@ class FixNoiseModel {
  private:
   FixNoiseModelParameters parameters_;
   double lag_s_;
-  LearntScale fresh_scale() const { return {parameters_.fix_scale_rate, parameters_.fix_scale_limit}; }
+  /// Where nothing is learnt, receivers are right.
+  LearntScale fresh_scale() const {
+    return {parameters_.fix_scale_rate, parameters_.fix_scale_limit,
+            parameters_.fix_scale_rate > 0.0 ? parameters_.first_fix_scale : 1.0};
+  }
 
+  std::optional<double> log_mean_variance_;  ///< of what fixes declare, per axis
   LearntScale scale_;
   std::optional<LearntScale> lagged_scale_;
   std::deque<DeadReckonedFix> fixes_;

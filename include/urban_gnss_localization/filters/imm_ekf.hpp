@@ -19,7 +19,7 @@ struct ImmEkfParameters {
   BiasModeParameters modes;
   OdometryErrorParameters odometry;
   double yaw_rate_scale_sigma{0.005};  ///< standard deviation of the odometry's relative yaw-rate error, a constant
-  double fix_scale_lag{8.0};           ///< s apart at which fixes are compared with the odometry between them; 0: never
+  double fix_scale_lag{15.0};          ///< s apart at which fixes are compared with the odometry between them; 0: never
   /// m per axis, of the error that fixes share for long (orbits, atmosphere), as far as they declare as much. No filter
   /// sees it: it is added to the covariance of the estimate
   double common_error_sigma{0.7};

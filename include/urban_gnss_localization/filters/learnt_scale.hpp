@@ -14,8 +14,10 @@ class LearntScale {
   /// Median of the chi-squared distribution of 2 degrees of freedom.
   static constexpr double kMedianNis = 1.3862943611198906;
 
-  /// `rate`: of a measurement, 0 to 1; `limit` >= 1: factor by which declared standard deviations may be wrong.
-  LearntScale(double rate, double limit) : rate_(rate), log_limit_(2.0 * std::log(limit)) {}
+  /// `rate`: of a measurement, 0 to 1; `limit` >= 1: factor by which declared standard deviations may be wrong;
+  /// `first`: what it is before anything is learnt.
+  LearntScale(double rate, double limit, double first = 1.0)
+      : rate_(rate), log_limit_(2.0 * std::log(limit)), log_scale_(std::log(first)) {}
 
   double value() const { return std::exp(log_scale_); }
   /// One measurement, with a share `exceeding` (0 to 1) of its NIS, at k times the declared covariance, beyond
@@ -27,7 +29,7 @@ class LearntScale {
  private:
   double rate_;
   double log_limit_;
-  double log_scale_{0.0};
+  double log_scale_;
 };
 
 }  // namespace urban_gnss

@@ -8,7 +8,7 @@ namespace urban_gnss {
 /// What is believed of a receiver's velocity. Its errors are independent in time (those of a position are not), small
 /// beside most signals, and large where a reflected one is among them: Student's t, with a scale that is learnt.
 struct VelocityNoiseParameters {
-  double velocity_scale_rate{0.03};  ///< 1, as fix_scale_rate, of the factor on the velocity's covariance
+  double velocity_scale_rate{0.03};   ///< 1, as fix_scale_rate, of the factor on the velocity's covariance
   double velocity_scale_limit{20.0};  ///< factor by which its standard deviations may be wrong, either way
   double velocity_dof{2.0};           ///< degrees of freedom of its noise; large ones are Gaussian
 
