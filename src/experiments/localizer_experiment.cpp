@@ -58,6 +58,13 @@ class Participant : public DriveParticipant {
       fix.covariance_type = CovarianceType::kKnown;
     }
     localization_.add_fix(fix);
+    if (epoch.fix->velocity_sigma_mps > 0.0) {
+      RawVelocity velocity;
+      velocity.stamp = epoch.stamp;
+      velocity.velocity = epoch.fix->velocity.head<2>();
+      velocity.covariance = std::pow(epoch.fix->velocity_sigma_mps, 2) * Eigen::Matrix2d::Identity();
+      localization_.add_velocity(velocity);
+    }
     settle();
   }
 

@@ -49,9 +49,12 @@ class Estimator {
       return;
     }
     if (kind_ == PaperMethod::Kind::kImm) {
-      filter_ = std::make_unique<ImmEkf>(ImmEkfParameters{conditions.filter.fix, conditions.filter.noise,
-                                                          conditions.filter.modes, conditions.filter.odometry},
-                                         conditions.filter_motion);
+      ImmEkfParameters parameters;
+      parameters.fix = conditions.filter.fix;
+      parameters.noise = conditions.filter.noise;
+      parameters.modes = conditions.filter.modes;
+      parameters.odometry = conditions.filter.odometry;
+      filter_ = std::make_unique<ImmEkf>(parameters, conditions.filter_motion);
     } else {
       auto filter = make_particle_filter(conditions.filter, conditions.filter_motion);
       particle_filter_ = filter.get();

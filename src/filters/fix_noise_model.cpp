@@ -10,6 +10,11 @@ namespace {
 /// Slower than this on average since the last fix, the robot stands.
 constexpr double kParked_mps = 0.05;
 constexpr double kMostInflation = 1e6;
+/// Weight of a fix in the mean of what fixes declare.
+constexpr double kMeanRate = 0.03;
+
+/// ln of the geometric mean of the variances along the ellipse's axes.
+double log_variance(const Eigen::Matrix2d& covariance) { return 0.5 * std::log(covariance.determinant()); }
 
 }  // namespace
 
@@ -20,8 +25,9 @@ double markov_inflation(double interval_s, double correlation_time_s) {
 }
 
 void FixNoiseModel::reset() {
-  scale_ = 1.0;
-  lagged_scale_ = 0.0;
+  scale_ = fresh_scale();
+  log_mean_variance_.reset();
+  lagged_scale_.reset();
   fixes_.clear();
   last_s_.reset();
   moved_m_ = 0.0;
@@ -33,20 +39,21 @@ void FixNoiseModel::move(const Twist2& twist, double duration_s) {
   elapsed_s_ += duration_s;
 }
 
+Eigen::Matrix2d FixNoiseModel::believed(const Eigen::Matrix2d& declared) {
+  const double now = log_variance(declared);
+  if (!log_mean_variance_) log_mean_variance_ = now;
+  *log_mean_variance_ += kMeanRate * (now - *log_mean_variance_);
+  return std::exp((parameters_.fix_covariance_weight - 1.0) * (now - *log_mean_variance_)) * declared;
+}
+
 double FixNoiseModel::correlation_inflation(double time_s) const {
   const bool is_parked = elapsed_s_ > 0.0 && moved_m_ < kParked_mps * elapsed_s_;
   const double correlation_s = is_parked ? parameters_.parked_correlation_time : parameters_.fix_correlation_time;
   return last_s_ ? markov_inflation(time_s - *last_s_, correlation_s) : 1.0;
 }
 
-double FixNoiseModel::changed(double scale, double exceeding) const {
-  const double limit = 2.0 * std::log(parameters_.fix_scale_limit);
-  const double step = parameters_.fix_scale_rate * (2.0 * exceeding - 1.0);
-  return std::exp(std::clamp(std::log(scale) + step, -limit, limit));
-}
-
 void FixNoiseModel::learn(double time_s, double exceeding) {
-  scale_ = changed(scale_, exceeding);
+  scale_.learn(exceeding);
   last_s_ = time_s;
   moved_m_ = 0.0;
   elapsed_s_ = 0.0;
@@ -59,15 +66,15 @@ void FixNoiseModel::compare(const DeadReckonedFix& fix) {
     const DeadReckonedFix& before = fixes_.front();
     const double apart = fix.time_s - before.time_s;
     if (apart >= lag_s_ && apart < 2.0 * lag_s_) {
-      if (lagged_scale_ == 0.0) lagged_scale_ = scale_;
+      if (!lagged_scale_) lagged_scale_ = scale_;
       const double turned =
           (fix.place - before.place).norm() * std::max(fix.heading_sigma_rad, before.heading_sigma_rad);
       const Eigen::Matrix2d covariance =
-          lagged_scale_ * (fix.covariance + before.covariance) +
+          lagged_scale_->value() * (fix.covariance + before.covariance) +
           (std::max(fix.walk_m2 - before.walk_m2, 0.0) + turned * turned) * Eigen::Matrix2d::Identity();
       const Eigen::Vector2d difference = fix.misfit - before.misfit;
       const double nis = difference.dot(covariance.inverse() * difference);
-      lagged_scale_ = changed(lagged_scale_, nis > kMedianNis ? 1.0 : 0.0);
+      lagged_scale_->learn(nis > LearntScale::kMedianNis ? 1.0 : 0.0);
     }
   }
   fixes_.push_back(fix);

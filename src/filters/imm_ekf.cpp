@@ -11,7 +11,9 @@ namespace urban_gnss {
 namespace {
 
 constexpr int kFixDof = 2;
+constexpr int kVelocityDof = 2;
 constexpr int kYaw = 2;
+constexpr int kSpeedScale = 3;
 constexpr int kYawRateScale = kErrorStates;
 /// Of direct reception's normalised innovation, for the verdict alone.
 constexpr double kReportedQuantile = 0.99;
@@ -51,7 +53,8 @@ ImmEkf::ImmEkf(const ImmEkfParameters& parameters, const MotionParameters& motio
     : parameters_(parameters),
       motion_(motion),
       nis_threshold_(chi_squared_quantile(kReportedQuantile, kFixDof)),
-      noise_(parameters.noise, parameters.fix_scale_lag) {
+      noise_(parameters.noise, parameters.fix_scale_lag),
+      velocity_scale_(parameters.velocity.fresh_scale()) {
   initialize({});
 }
 
@@ -67,6 +70,7 @@ void ImmEkf::initialize(const PoseEstimate& start) {
   probability_ << 1.0, 0.0, 0.0;
   bias_odds_ = 1.0;
   noise_.reset();
+  velocity_scale_ = parameters_.velocity.fresh_scale();
   last_fix_s_.reset();
   moved_s_ = 0.0;
   corrections_.setZero();
@@ -210,7 +214,7 @@ FixVerdict ImmEkf::correct(const FixMeasurement& fix) {
   double exceeding = 0.0;
   for (std::size_t j = 0; j < kContinuations; ++j) {
     any_outlier += (posterior[j] /= sum) * outlier[j];
-    if (white_nis[j] > FixNoiseModel::kMedianNis) exceeding += posterior[j];
+    if (white_nis[j] > LearntScale::kMedianNis) exceeding += posterior[j];
   }
   noise_.learn(fix.time_s, exceeding);
 
@@ -233,6 +237,43 @@ FixVerdict ImmEkf::correct(const FixMeasurement& fix) {
     verdict.reason = "outlier, probability " + std::to_string(any_outlier);
   }
   return verdict;
+}
+
+void ImmEkf::correct_velocity(const VelocityMeasurement& measured) {
+  if (!is_usable(measured)) return;
+  const double dof = parameters_.velocity.velocity_dof;
+  const Eigen::Matrix2d noise = velocity_scale_.value() * measured.covariance;
+  std::array<Gaussian, kLastingModes> next = filters_;
+  ModeProbabilities log_weight;
+  double exceeding = 0.0;
+  for (std::size_t i = 0; i < kLastingModes; ++i) {
+    Gaussian& state = next[i];
+    const Eigen::Vector2d along = transform_point({0.0, 0.0, state.mean[kYaw]}, measured.antenna_velocity_in_body);
+    const Eigen::Vector2d predicted = (1.0 + state.mean[kSpeedScale]) * along;
+    Eigen::Matrix<double, 2, kDimension> h = Eigen::Matrix<double, 2, kDimension>::Zero();
+    h.col(kYaw) << -predicted.y(), predicted.x();
+    h.col(kSpeedScale) = along;
+    const Eigen::Vector2d innovation = measured.velocity - predicted;
+    const Eigen::Matrix<double, kDimension, 2> with_velocity = state.covariance * h.transpose();
+    const Eigen::Matrix2d hph = h * with_velocity;
+    const Eigen::Matrix2d plain = hph + noise;
+    const double nis = innovation.dot(plain.inverse() * innovation);
+    const double weight = std::min(1.0, (dof + kVelocityDof) / (dof + nis));
+    const Eigen::Matrix2d s = hph + noise / weight;
+    const Eigen::Matrix<double, kDimension, 2> gain = with_velocity * s.inverse();
+    state.mean += gain * innovation;
+    state.mean[kYaw] = wrap_angle(state.mean[kYaw]);
+    state.covariance -= gain * with_velocity.transpose();
+    state.covariance = 0.5 * (state.covariance + state.covariance.transpose().eval());
+    log_weight[static_cast<int>(i)] =
+        -0.5 * (dof + kVelocityDof) * std::log1p(nis / dof) - 0.5 * std::log(plain.determinant());
+    if (nis > LearntScale::kMedianNis) exceeding += probability_[static_cast<int>(i)];
+    if (!state.mean.allFinite() || !state.covariance.allFinite()) return;
+  }
+  filters_ = next;
+  probability_ = probability_.cwiseProduct((log_weight.array() - log_weight.maxCoeff()).exp().matrix());
+  probability_ /= probability_.sum();
+  velocity_scale_.learn(exceeding);
 }
 
 void ImmEkf::compare_with_odometry(const FixMeasurement& fix, const Gaussian& before) {

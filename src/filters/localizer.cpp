@@ -11,6 +11,11 @@ bool is_usable(const FixMeasurement& fix) {
          is_positive_definite<2>(fix.covariance);
 }
 
+bool is_usable(const VelocityMeasurement& velocity) {
+  return velocity.velocity.allFinite() && velocity.antenna_velocity_in_body.allFinite() &&
+         is_positive_definite<2>(velocity.covariance);
+}
+
 bool is_usable(const Twist2& twist, double duration_s) {
   return std::isfinite(twist.speed_mps) && std::isfinite(twist.yaw_rate_radps) && std::isfinite(duration_s) &&
          duration_s > 0.0;

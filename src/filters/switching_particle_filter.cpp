@@ -298,7 +298,7 @@ bool SwitchingParticleFilter::is_beyond_median(const FixMeasurement& fix, double
   }
   const Eigen::Matrix2d covariance =
       square - mean * mean.transpose() + noise_.scale() * parameters_.fix.direct_covariance(fix.covariance);
-  return mean.dot(covariance.ldlt().solve(mean)) > FixNoiseModel::kMedianNis;
+  return mean.dot(covariance.ldlt().solve(mean)) > LearntScale::kMedianNis;
 }
 
 void SwitchingParticleFilter::examine(const FixMeasurement& fix, FixVerdict& verdict) const {

@@ -40,6 +40,13 @@ std::optional<Pose2> OdometryHistory::pose_at(Stamp stamp) const {
   return move(previous->pose, next->twist, to_seconds(stamp - previous->stamp));
 }
 
+std::optional<Twist2> OdometryHistory::twist_at(Stamp stamp) const {
+  if (path_.empty() || stamp < oldest() || stamp > latest()) return std::nullopt;
+  return std::lower_bound(path_.begin(), path_.end(), stamp,
+                          [](const Node& node, Stamp value) { return node.stamp < value; })
+      ->twist;
+}
+
 std::optional<Pose2> OdometryHistory::motion_between(Stamp from, Stamp to) const {
   const auto start = pose_at(from);
   const auto end = pose_at(to);

@@ -6,12 +6,14 @@
 
 #include "limits.hpp"
 #include "text.hpp"
+#include "urban_gnss_localization/filters/unscented.hpp"
 
 namespace urban_gnss {
 namespace {
 
 /// A fix that is farther ahead of the odometry than this has a wrong stamp.
 constexpr double kMaxAhead_s = 10.0;
+constexpr double kMaxSpeed_mps = 150.0;
 
 }  // namespace
 
@@ -39,7 +41,8 @@ LocalizationPipeline::LocalizationPipeline(const LocalizationParameters& paramet
       history_(kHistory_s),
       odometry_stamps_(parameters.time_jump),
       fix_stamps_(parameters.time_jump),
-      imu_stamps_(parameters.time_jump) {
+      imu_stamps_(parameters.time_jump),
+      velocity_stamps_(parameters.time_jump) {
   reset({});
 }
 
@@ -53,6 +56,7 @@ void LocalizationPipeline::reset(const std::string& why) {
   imu_yaw_rates_.clear();
   before_datum_.clear();
   pending_.clear();
+  pending_velocities_.clear();
   last_fix_stamp_.reset();
   biases_.clear();
   last_radius_m_ = 0.0;
@@ -83,7 +87,7 @@ bool LocalizationPipeline::is_new(StampMonitor& monitor, Stamp stamp, const char
   return monitor.accept(stamp, [&](Stamp back) {
     if (!parameters_.reset_on_time_jump) return false;
     reset(std::string("the clock of the ") + stream + " jumped back by " + seconds_text(to_seconds(back)));
-    for (StampMonitor* each : {&odometry_stamps_, &fix_stamps_, &imu_stamps_}) each->reset();
+    for (StampMonitor* each : {&odometry_stamps_, &fix_stamps_, &imu_stamps_, &velocity_stamps_}) each->reset();
     return true;
   });
 }
@@ -140,6 +144,7 @@ void LocalizationPipeline::add_odometry(const OdometrySample& sample) {
     guard_against_non_finite();
   }
   if (!initialized_ && start_ && frame_) start(*start_, "the given pose");
+  process_velocities();
   process_fixes();
   if (initialized_) outputs_.push_back({sample.stamp, localizer_->estimate(), sample.pose, twist});
 }
@@ -165,6 +170,49 @@ void LocalizationPipeline::add_fix(const RawFix& fix) {
   }
   sanitize(fix);
   process_fixes();
+}
+
+void LocalizationPipeline::add_velocity(const RawVelocity& raw) {
+  if (!parameters_.use_gps_velocity) return;
+  if (!raw.velocity.allFinite() || raw.velocity.norm() > kMaxSpeed_mps) {
+    event(PipelineEvent::Level::kWarn, "velocity of the receiver left out: not finite, or beyond 150 m/s");
+    return;
+  }
+  if (last_odometry_ && to_seconds(raw.stamp - last_odometry_->stamp) > kMaxAhead_s) {
+    event(PipelineEvent::Level::kWarn,
+          "velocity of the receiver left out: more than " + seconds_text(kMaxAhead_s) + " ahead of the odometry");
+    return;
+  }
+  if (!is_new(velocity_stamps_, raw.stamp, "velocities")) return;
+  RawVelocity velocity = raw;
+  const double floor = parameters_.velocity_sigma_floor;
+  const double fallback = parameters_.velocity_sigma_default;
+  if (is_positive_definite<2>(raw.covariance)) {
+    velocity.covariance += floor * floor * Eigen::Matrix2d::Identity();
+  } else {
+    velocity.covariance = fallback * fallback * Eigen::Matrix2d::Identity();
+  }
+  if (pending_velocities_.size() >= kMaxWaitingFixes) pending_velocities_.pop_front();
+  pending_velocities_.push_back(velocity);
+  process_velocities();
+}
+
+void LocalizationPipeline::process_velocities() {
+  while (!pending_velocities_.empty() && !history_.empty() && pending_velocities_.front().stamp <= history_.latest()) {
+    const RawVelocity velocity = pending_velocities_.front();
+    pending_velocities_.pop_front();
+    const auto motion = history_.motion_between(history_.latest(), velocity.stamp);
+    if (!initialized_ || !motion) continue;
+    const Twist2 twist = *history_.twist_at(velocity.stamp);
+    const Eigen::Vector2d lever = antenna_offset();
+    const Eigen::Vector2d then(twist.speed_mps - twist.yaw_rate_radps * lever.y(), twist.yaw_rate_radps * lever.x());
+    VelocityMeasurement measurement;
+    measurement.velocity = velocity.velocity;
+    measurement.covariance = velocity.covariance;
+    measurement.antenna_velocity_in_body = transform_point({0.0, 0.0, motion->yaw}, then);
+    localizer_->correct_velocity(measurement);
+    guard_against_non_finite();
+  }
 }
 
 void LocalizationPipeline::sanitize(const RawFix& fix) {

@@ -95,6 +95,20 @@ OdometrySample to_odometry_sample(const nav_msgs::Odometry& message) {
   return sample;
 }
 
+RawVelocity to_raw_velocity(const geometry_msgs::TwistWithCovarianceStamped& message) {
+  constexpr int kDimension = 6;
+  RawVelocity velocity;
+  velocity.stamp = to_stamp(message.header.stamp);
+  velocity.velocity = {message.twist.twist.linear.x, message.twist.twist.linear.y};
+  for (int row = 0; row < 2; ++row) {
+    for (int column = 0; column < 2; ++column) {
+      velocity.covariance(row, column) =
+          message.twist.covariance[static_cast<std::size_t>(kDimension * row + column)];
+    }
+  }
+  return velocity;
+}
+
 std::optional<double> to_yaw_rate(const sensor_msgs::Imu& message) {
   if (message.angular_velocity_covariance[0] == -1.0) return std::nullopt;
   const Eigen::Vector3d rate(message.angular_velocity.x, message.angular_velocity.y, message.angular_velocity.z);

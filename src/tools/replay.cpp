@@ -40,6 +40,7 @@ struct Options {
   std::string fix_topic = topics::kFix;
   std::string odom_topic = topics::kOdometry;
   std::string imu_topic;
+  std::string velocity_topic = topics::kVelocity;
   std::string truth_topic = topics::kTruth;
   std::vector<double> datum;
   int seed = -1;
@@ -174,6 +175,10 @@ class Replay {
     pipeline_.add_fix(to_raw_fix(message));
     settle();
   }
+  void add_velocity(const geometry_msgs::TwistWithCovarianceStamped& message) {
+    pipeline_.add_velocity(to_raw_velocity(message));
+    settle();
+  }
   void add_imu(const sensor_msgs::Imu& message) {
     if (const auto rate = to_yaw_rate(message)) pipeline_.add_imu_yaw_rate(to_stamp(message.header.stamp), *rate);
   }
@@ -299,8 +304,9 @@ void run(const Options& options) {
   const std::string fix = without_leading_slash(options.fix_topic);
   const std::string odom = without_leading_slash(options.odom_topic);
   const std::string imu = without_leading_slash(options.imu_topic);
+  const std::string velocity = without_leading_slash(options.velocity_topic);
   const std::string truth = without_leading_slash(options.truth_topic);
-  const auto messages = ordered_messages(bag, {topics::kDatum, imu, odom, fix, truth});
+  const auto messages = ordered_messages(bag, {topics::kDatum, imu, odom, fix, velocity, truth});
   const auto count = [&](const std::string& name) {
     return std::count_if(messages.begin(), messages.end(),
                          [&](const auto& message) { return without_leading_slash(message.getTopic()) == name; });
@@ -327,6 +333,8 @@ void run(const Options& options) {
       replay.add_odometry(*expect<nav_msgs::Odometry>(message));
     } else if (name == fix) {
       replay.add_fix(*expect<sensor_msgs::NavSatFix>(message));
+    } else if (name == velocity) {
+      replay.add_velocity(*expect<geometry_msgs::TwistWithCovarianceStamped>(message));
     } else if (name == imu) {
       replay.add_imu(*expect<sensor_msgs::Imu>(message));
     } else if (name == truth) {
@@ -380,6 +388,8 @@ int main(int argc, char** argv) {
   app.add_option("--output", options.output, "bag to write: odometry/filtered, gps/bias, status, tf");
   app.add_option("--fix-topic", options.fix_topic, "sensor_msgs/NavSatFix");
   app.add_option("--odom-topic", options.odom_topic, "nav_msgs/Odometry");
+  app.add_option("--velocity-topic", options.velocity_topic,
+                 "geometry_msgs/TwistWithCovarianceStamped of the receiver, where the bag has it");
   app.add_option("--imu-topic", options.imu_topic, "sensor_msgs/Imu whose yaw rate is used instead of the odometry's");
   app.add_option("--truth-topic", options.truth_topic, "nav_msgs/Odometry, for the errors only");
   app.add_option("--datum", options.datum,

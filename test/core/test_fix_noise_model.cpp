@@ -10,7 +10,9 @@
 namespace urban_gnss {
 namespace {
 
-FixNoiseModelParameters make(const std::string& changes = "{}") { return with(FixNoiseModelParameters{}, changes); }
+FixNoiseModelParameters make(const std::string& changes = "{}") {
+  return with(with(FixNoiseModelParameters{}, "first_fix_scale: 1.0"), changes);
+}
 
 /// Where the factor settles for fixes whose errors are `sigma` times the declared, a share of them outliers.
 double settled_scale(double sigma, double outlier_share, const FixNoiseModelParameters& parameters) {
@@ -22,14 +24,14 @@ double settled_scale(double sigma, double outlier_share, const FixNoiseModelPara
     double x = sigma * draw_normal(engine);
     if (draw_uniform(engine) < outlier_share) x += 1e6;
     const double y = sigma * draw_normal(engine);
-    model.learn(k, (x * x + y * y) / model.scale() > FixNoiseModel::kMedianNis ? 1.0 : 0.0);
+    model.learn(k, (x * x + y * y) / model.scale() > LearntScale::kMedianNis ? 1.0 : 0.0);
     if (k >= kCount / 2) log_sum += std::log(model.scale());
   }
   return std::exp(log_sum / (kCount / 2));
 }
 
 TEST(FixNoiseModel, MedianIsThatOfTheChiSquaredDistribution) {
-  EXPECT_NEAR(FixNoiseModel::kMedianNis, chi_squared_quantile(0.5, 2), 1e-9);
+  EXPECT_NEAR(LearntScale::kMedianNis, chi_squared_quantile(0.5, 2), 1e-9);
 }
 
 TEST(FixNoiseModel, LearnsTheReceiversFactorWhateverTheOutliers) {
@@ -45,6 +47,26 @@ TEST(FixNoiseModel, StaysWithinItsLimit) {
   EXPECT_NEAR(settled_scale(100.0, 0.0, make("fix_scale_limit: 3.0")), 9.0, 1e-3);
   EXPECT_NEAR(settled_scale(0.01, 0.0, make("fix_scale_limit: 3.0")), 1.0 / 9.0, 0.02);
   EXPECT_EQ(settled_scale(100.0, 0.0, make("fix_scale_rate: 0.0")), 1.0);
+}
+
+TEST(FixNoiseModel, BeginsWithItsFirstScaleWhereItLearns) {
+  EXPECT_DOUBLE_EQ(FixNoiseModel(make("first_fix_scale: 4.0")).scale(), 4.0);
+  EXPECT_DOUBLE_EQ(FixNoiseModel(make("{first_fix_scale: 4.0, fix_scale_rate: 0.0}")).scale(), 1.0);
+}
+
+TEST(FixNoiseModel, BelievesDeclaredUpsAndDownsByItsWeight) {
+  Eigen::Matrix2d usual;
+  usual << 4.0, 1.0, 1.0, 9.0;
+  for (const double weight : {0.0, 0.5, 1.0}) {
+    FixNoiseModel model(make("fix_covariance_weight: " + std::to_string(weight)));
+    for (int k = 0; k < 50; ++k) EXPECT_NEAR((model.believed(usual) - usual).norm(), 0.0, 1e-9);
+    // A fix that declares a hundredfold moves the mean a little itself; the ellipse keeps its shape.
+    const Eigen::Matrix2d raised = model.believed(100.0 * usual);
+    const double expected = std::pow(100.0, weight + (1.0 - weight) * 0.03);
+    EXPECT_NEAR((raised - expected * usual).norm() / raised.norm(), 0.0, 1e-9) << weight;
+    model.reset();
+    EXPECT_NEAR((model.believed(100.0 * usual) - 100.0 * usual).norm(), 0.0, 1e-9);
+  }
 }
 
 TEST(FixNoiseModel, CorrelatedFixesAreWorthLess) {

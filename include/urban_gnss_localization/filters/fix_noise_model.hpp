@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "urban_gnss_localization/common/parameters.hpp"
+#include "urban_gnss_localization/filters/learnt_scale.hpp"
 #include "urban_gnss_localization/motion/motion_model.hpp"
 
 namespace urban_gnss {
@@ -14,6 +15,8 @@ namespace urban_gnss {
 struct FixNoiseModelParameters {
   /// 1, by how much a fix changes the logarithm of the factor on the declared covariance; 0: the factor stays 1
   double fix_scale_rate{0.03};
+  double first_fix_scale{2.0};           ///< factor on the declared covariance before anything is learnt
+  double fix_covariance_weight{0.5};     ///< 0 to 1, how far the declared covariance's ups and downs are believed
   double fix_scale_limit{20.0};          ///< factor by which declared standard deviations may be wrong, either way
   double fix_correlation_time{3.0};      ///< s, over which the error of a fix stays the same; 0: independent errors
   double parked_correlation_time{30.0};  ///< s, the same while the robot stands: reflections change little then (F34)
@@ -21,6 +24,8 @@ struct FixNoiseModelParameters {
   template <class V>
   void visit(V& v) {
     v("fix_scale_rate", fix_scale_rate, between(0.0, 1.0));
+    v("first_fix_scale", first_fix_scale, positive());
+    v("fix_covariance_weight", fix_covariance_weight, between(0.0, 1.0));
     v("fix_scale_limit", fix_scale_limit, at_least(1.0));
     v("fix_correlation_time", fix_correlation_time, non_negative());
     v("parked_correlation_time", parked_correlation_time, non_negative());
@@ -44,12 +49,7 @@ struct DeadReckonedFix {
 double markov_inflation(double interval_s, double correlation_time_s);
 
 /// What a fix is worth: the covariance that its receiver declares follows its errors up and down, but is too small
-/// or too large by a factor, which is learnt, and errors are correlated in time.
-///
-/// The factor k is such that half of the fixes have a normalised innovation below the median of the chi-squared
-/// distribution (2 ln 2): each fix raises or lowers ln k by fix_scale_rate (stochastic approximation of a quantile,
-/// Robbins and Monro 1951). Outliers, however far, weigh no more than others, and the half of the fixes that are the
-/// worst of all may be anything.
+/// or too large by a factor, which is learnt (LearntScale), and errors are correlated in time.
 ///
 /// A receiver that smooths takes a filter along: the innovations stay small, and the factor learnt from them falls
 /// without end. Two fixes that are farther apart than it smooths, and the odometry between them, still tell its errors.
@@ -59,34 +59,38 @@ class FixNoiseModel {
  public:
   /// Requires parameters without faults. `lag_s`: how far apart fixes are compared; 0: they are not.
   explicit FixNoiseModel(const FixNoiseModelParameters& parameters, double lag_s = 0.0)
-      : parameters_(parameters), lag_s_(lag_s) {}
+      : parameters_(parameters), lag_s_(lag_s), scale_(fresh_scale()) {}
 
   /// Forgets everything, the factor too: a filter that starts anew gives the same again.
   void reset();
   /// Odometry since the last fix: whether the robot stands.
   void move(const Twist2& twist, double duration_s);
 
-  double scale() const { return std::max(scale_, lagged_scale_); }
+  double scale() const { return lagged_scale_ ? std::max(scale_.value(), lagged_scale_->value()) : scale_.value(); }
+  /// The next fix declares `declared` (m^2, positive definite): as far as its ups and downs are believed. Its size is
+  /// drawn towards the geometric mean of those declared lately, by the power 1 - fix_covariance_weight.
+  Eigen::Matrix2d believed(const Eigen::Matrix2d& declared);
   /// Factor on the covariance of a fix at `time_s` by which correlation lowers its worth, at least 1.
   double correlation_inflation(double time_s) const;
 
-  /// The fix at `time_s` was used, with a share `exceeding` (0 to 1) of the innovation's NIS, at k times the declared
-  /// covariance, beyond kMedianNis.
+  /// The fix at `time_s` was used, with a share `exceeding` of its NIS beyond the median: LearntScale::learn().
   void learn(double time_s, double exceeding);
   /// Compares the fix with that of the lag before: learns a second factor, from differences of which a filter that
   /// follows its fixes knows nothing. The larger of the two counts.
   void compare(const DeadReckonedFix& fix);
 
-  /// Median of the chi-squared distribution of 2 degrees of freedom.
-  static constexpr double kMedianNis = 1.3862943611198906;
-
  private:
   FixNoiseModelParameters parameters_;
   double lag_s_;
-  double changed(double scale, double exceeding) const;
+  /// Where nothing is learnt, receivers are right.
+  LearntScale fresh_scale() const {
+    return {parameters_.fix_scale_rate, parameters_.fix_scale_limit,
+            parameters_.fix_scale_rate > 0.0 ? parameters_.first_fix_scale : 1.0};
+  }
 
-  double scale_{1.0};
-  double lagged_scale_{0.0};  ///< 0: nothing known
+  std::optional<double> log_mean_variance_;  ///< of what fixes declare, per axis
+  LearntScale scale_;
+  std::optional<LearntScale> lagged_scale_;
   std::deque<DeadReckonedFix> fixes_;
   std::optional<double> last_s_;
   double moved_m_{0.0};

@@ -8,16 +8,18 @@
 #include "urban_gnss_localization/filters/dead_reckoning.hpp"
 #include "urban_gnss_localization/filters/fix_noise_model.hpp"
 #include "urban_gnss_localization/filters/localizer.hpp"
+#include "urban_gnss_localization/filters/velocity_noise.hpp"
 
 namespace urban_gnss {
 
 struct ImmEkfParameters {
   FixSigmaParameters fix;
   FixNoiseModelParameters noise;
+  VelocityNoiseParameters velocity;
   BiasModeParameters modes;
   OdometryErrorParameters odometry;
   double yaw_rate_scale_sigma{0.005};  ///< standard deviation of the odometry's relative yaw-rate error, a constant
-  double fix_scale_lag{8.0};           ///< s apart at which fixes are compared with the odometry between them; 0: never
+  double fix_scale_lag{15.0};          ///< s apart at which fixes are compared with the odometry between them; 0: never
   /// m per axis, of the error that fixes share for long (orbits, atmosphere), as far as they declare as much. No filter
   /// sees it: it is added to the covariance of the estimate
   double common_error_sigma{0.7};
@@ -26,6 +28,7 @@ struct ImmEkfParameters {
   void visit(V& v) {
     fix.visit(v);
     noise.visit(v);
+    velocity.visit(v);
     modes.visit(v);
     odometry.visit(v);
     v("yaw_rate_scale_sigma", yaw_rate_scale_sigma, non_negative());
@@ -70,6 +73,8 @@ class ImmEkf : public Localizer {
   void move(const Twist2& twist, double duration_s) override;
   /// kRejectedNonFinite for a fix that is not finite or has no positive definite covariance.
   FixVerdict correct(const FixMeasurement& fix) override;
+  /// Leaves out a velocity that cannot be used.
+  void correct_velocity(const VelocityMeasurement& velocity) override;
   Pose2 pose() const override;
   PoseEstimate estimate() const override;
   LocalizerHealth health() const override;
@@ -101,6 +106,7 @@ class ImmEkf : public Localizer {
   MotionParameters motion_;
   double nis_threshold_;
   FixNoiseModel noise_;
+  LearntScale velocity_scale_;
   std::array<Gaussian, kLastingModes> filters_;
   ModeProbabilities probability_{ModeProbabilities::Zero()};
   double bias_odds_{1.0};

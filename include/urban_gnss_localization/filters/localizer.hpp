@@ -22,8 +22,18 @@ struct FixMeasurement {
   Stamp stamp{0};             ///< of the fix, for what is published about it
 };
 
+/// A receiver's velocity, from the Doppler shift of its signals, at the moment it enters a filter.
+struct VelocityMeasurement {
+  Eigen::Vector2d velocity{Eigen::Vector2d::Zero()};        ///< m/s east and north, of the antenna
+  Eigen::Matrix2d covariance{Eigen::Matrix2d::Identity()};  ///< (m/s)^2
+  /// By the odometry at the velocity's stamp (m/s), seen from the base as it stands now.
+  Eigen::Vector2d antenna_velocity_in_body{Eigen::Vector2d::Zero()};
+};
+
 /// Whether a filter can take the fix: all finite, with a positive definite covariance.
 bool is_usable(const FixMeasurement& fix);
+/// The same for a velocity.
+bool is_usable(const VelocityMeasurement& velocity);
 /// Whether a filter can move by the step: finite, for a positive time.
 bool is_usable(const Twist2& twist, double duration_s);
 
@@ -59,6 +69,9 @@ class Localizer {
 
   /// Takes one fix. The verdict carries the decision with its NIS.
   virtual FixVerdict correct(const FixMeasurement& fix) = 0;
+
+  /// Takes one velocity of the receiver; the methods that know of none leave it out.
+  virtual void correct_velocity(const VelocityMeasurement& /*velocity*/) {}
 
   virtual Pose2 pose() const = 0;
   /// The pose with its covariance.

@@ -30,6 +30,13 @@ struct RawFix {
   CovarianceType covariance_type{CovarianceType::kUnknown};
 };
 
+/// A receiver's velocity from Doppler shifts, as it reports it, nothing checked.
+struct RawVelocity {
+  Stamp stamp{0};
+  Eigen::Vector2d velocity{Eigen::Vector2d::Zero()};    ///< m/s east and north
+  Eigen::Matrix2d covariance{Eigen::Matrix2d::Zero()};  ///< (m/s)^2; not positive definite: not declared
+};
+
 /// A fix in the map frame that passed sanitation: finite, with a positive definite covariance.
 struct LocalFix {
   Stamp stamp{0};

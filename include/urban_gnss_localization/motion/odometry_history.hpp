@@ -34,6 +34,9 @@ class OdometryHistory {
   /// Dead-reckoned pose at `stamp`, exact on the arcs between messages; nothing outside [oldest, latest].
   std::optional<Pose2> pose_at(Stamp stamp) const;
 
+  /// The twist of the step that holds `stamp`; nothing outside [oldest, latest].
+  std::optional<Twist2> twist_at(Stamp stamp) const;
+
   /// The motion from `from` to `to`, in the robot's frame at `from`; nothing where either lies outside.
   std::optional<Pose2> motion_between(Stamp from, Stamp to) const;
 

@@ -22,6 +22,10 @@ struct LocalizationParameters {
   double initial_heading_sigma{0.2};             ///< rad, of initial_pose
   std::vector<double> antenna_offset{0.0, 0.0};  ///< m, x and y of the antenna in the base frame
   bool use_imu_yaw_rate{false};                  ///< the IMU's yaw rate in place of the odometry's, where there is one
+  bool use_gps_velocity{true};    ///< the receiver's velocity, by localizers that know what to do with it
+  /// m/s per axis, where a receiver declares no covariance of its velocity
+  double velocity_sigma_default{0.3};
+  double velocity_sigma_floor{0.05};  ///< m/s per axis, least that is believed
   double odometry_gap{2.0};                      ///< s without odometry after which the robot's place is unknown
   /// m, beyond three declared standard deviations: a fix farther from the estimate cannot be explained by reflections
   /// (Nishida et al., Japanese text: the distance does not vary by more than some tens of metres)
@@ -43,6 +47,9 @@ struct LocalizationParameters {
     v("initial_heading_sigma", initial_heading_sigma, non_negative());
     v("antenna_offset", antenna_offset);
     v("use_imu_yaw_rate", use_imu_yaw_rate);
+    v("use_gps_velocity", use_gps_velocity);
+    v("velocity_sigma_default", velocity_sigma_default, positive());
+    v("velocity_sigma_floor", velocity_sigma_floor, positive());
     v("odometry_gap", odometry_gap, positive());
     v("max_bias_radius", max_bias_radius, positive());
     v("lost_timeout", lost_timeout, positive());
@@ -118,6 +125,8 @@ class LocalizationPipeline {
   void add_odometry(const OdometrySample& sample);
   void add_imu_yaw_rate(Stamp stamp, double yaw_rate_radps);
   void add_fix(const RawFix& fix);
+  /// A velocity of the receiver. One that cannot be used is left out, with an event that says why.
+  void add_velocity(const RawVelocity& velocity);
   /// The bias at a fix, where the localizer wants one.
   void add_bias(const BiasEstimate& bias);
 
@@ -159,6 +168,7 @@ class LocalizationPipeline {
 
   void use_datum(const GeodeticPosition& datum, const std::string& source);
   void sanitize(const RawFix& fix);
+  void process_velocities();
   void process_fixes();
   bool process_next_fix();
   void initialize_with(const PendingFix& pending);
@@ -195,11 +205,13 @@ class LocalizationPipeline {
   StampMonitor odometry_stamps_;
   StampMonitor fix_stamps_;
   StampMonitor imu_stamps_;
+  StampMonitor velocity_stamps_;
   std::optional<OdometrySample> last_odometry_;
   std::deque<std::pair<Stamp, double>> imu_yaw_rates_;
 
   std::deque<RawFix> before_datum_;
   std::deque<PendingFix> pending_;
+  std::deque<RawVelocity> pending_velocities_;
   std::optional<Stamp> last_fix_stamp_;
   std::optional<Stamp> last_start_fix_;  ///< that the initial pose is being found from
   std::deque<BiasEstimate> biases_;

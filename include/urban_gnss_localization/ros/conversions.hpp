@@ -3,6 +3,7 @@
 #include <geometry_msgs/PoseArray.h>
 #include <geometry_msgs/PoseWithCovariance.h>
 #include <geometry_msgs/TransformStamped.h>
+#include <geometry_msgs/TwistWithCovarianceStamped.h>
 #include <nav_msgs/Odometry.h>
 #include <ros/time.h>
 #include <sensor_msgs/Imu.h>
@@ -44,6 +45,8 @@ Stamp to_stamp(const ros::Time& time);
 ros::Time to_ros(Stamp stamp);
 
 RawFix to_raw_fix(const sensor_msgs::NavSatFix& message);
+/// East and north of a receiver's velocity, whatever the frame's name is.
+RawVelocity to_raw_velocity(const geometry_msgs::TwistWithCovarianceStamped& message);
 /// A fix without covariance.
 sensor_msgs::NavSatFix to_message(const GeodeticPosition& place, const ros::Time& time, const std::string& frame);
 GeodeticPosition to_geodetic(const sensor_msgs::NavSatFix& message);

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+namespace urban_gnss {
+
+/// Factor k on a declared covariance of two dimensions, such that half of the measurements have a normalised innovation
+/// below the median of the chi-squared distribution (2 ln 2): each raises or lowers ln k by a rate (stochastic
+/// approximation of a quantile, Robbins and Monro 1951). Outliers, however far, weigh no more than others, and the half
+/// that are the worst of all may be anything.
+class LearntScale {
+ public:
+  /// Median of the chi-squared distribution of 2 degrees of freedom.
+  static constexpr double kMedianNis = 1.3862943611198906;
+
+  /// `rate`: of a measurement, 0 to 1; `limit` >= 1: factor by which declared standard deviations may be wrong;
+  /// `first`: what it is before anything is learnt.
+  LearntScale(double rate, double limit, double first = 1.0)
+      : rate_(rate), log_limit_(2.0 * std::log(limit)), log_scale_(std::log(first)) {}
+
+  double value() const { return std::exp(log_scale_); }
+  /// One measurement, with a share `exceeding` (0 to 1) of its NIS, at k times the declared covariance, beyond
+  /// kMedianNis.
+  void learn(double exceeding) {
+    log_scale_ = std::clamp(log_scale_ + rate_ * (2.0 * exceeding - 1.0), -log_limit_, log_limit_);
+  }
+
+ private:
+  double rate_;
+  double log_limit_;
+  double log_scale_;
+};
+
+}  // namespace urban_gnss

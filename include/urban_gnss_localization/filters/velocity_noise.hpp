@@ -1,0 +1,26 @@
+#pragma once
+
+#include "urban_gnss_localization/common/parameters.hpp"
+#include "urban_gnss_localization/filters/learnt_scale.hpp"
+
+namespace urban_gnss {
+
+/// What is believed of a receiver's velocity. Its errors are independent in time (those of a position are not), small
+/// beside most signals, and large where a reflected one is among them: Student's t, with a scale that is learnt.
+struct VelocityNoiseParameters {
+  double velocity_scale_rate{0.03};   ///< 1, as fix_scale_rate, of the factor on the velocity's covariance
+  double velocity_scale_limit{20.0};  ///< factor by which its standard deviations may be wrong, either way
+  double velocity_dof{2.0};           ///< degrees of freedom of its noise; large ones are Gaussian
+
+  template <class V>
+  void visit(V& v) {
+    v("velocity_scale_rate", velocity_scale_rate, between(0.0, 1.0));
+    v("velocity_scale_limit", velocity_scale_limit, at_least(1.0));
+    v("velocity_dof", velocity_dof, positive());
+  }
+  void check(std::vector<std::string>&) const {}
+
+  LearntScale fresh_scale() const { return {velocity_scale_rate, velocity_scale_limit}; }
+};
+
+}  // namespace urban_gnss
