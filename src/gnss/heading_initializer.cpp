@@ -12,6 +12,7 @@ namespace {
 constexpr std::size_t kMinFixes = 4;
 constexpr std::size_t kMinVelocities = 4;
 constexpr double kMinSpeed_mps = 0.3;
+constexpr double kMinSpeedFactor = 0.7;     // noise comes this far with 0.2 % where it says to tell the yaw to 0.2 rad
 constexpr int kIterations = 20;             // the weights settle within a few
 constexpr double kCauchyTuning = 2.3849;    // 95 % efficiency where the noise is Gaussian after all
 constexpr double kRayleighMedian = 1.1774;  // median length of a 2-D vector with unit variance per axis
@@ -35,7 +36,7 @@ struct Observations {
   Observations(std::size_t least, const Samples& samples, const CovarianceOf& covariance_of) : minimum(least) {
     for (const auto& sample : samples) information.push_back(2.0 / covariance_of(sample).trace());
     weights = information;
-    if (information.size() < minimum) weights.assign(information.size(), 0.0);
+    if (information.size() < minimum) leave_out();
   }
 
   /// `lengths` of the residuals.
@@ -58,8 +59,9 @@ struct Observations {
     for (std::size_t i = 0; i < weights.size(); ++i) {
       weights[i] = weights[i] > 0.0 && residuals[i] <= std::sqrt(kAgreement) * s ? information[i] / (s * s) : 0.0;
     }
-    if (count() < minimum) weights.assign(weights.size(), 0.0);
+    if (count() < minimum) leave_out();
   }
+  void leave_out() { weights.assign(weights.size(), 0.0); }
   /// Weights by the declared variances, or by those that the residuals say where these are larger. Of two coordinates
   /// each, the estimation has taken `dof` degrees of freedom.
   void weigh_by_variance(double dof) {
@@ -172,7 +174,7 @@ std::string HeadingInitializer::waiting_for() const {
 
 HeadingInitializer::Alignment HeadingInitializer::align(const std::vector<double>& fix_weights,
                                                         const std::vector<double>& velocity_weights) const {
-  Alignment result{Eigen::Vector2d::Zero(), Eigen::Vector2d::Zero(), 0.0, 0.0, 0.0, 0.0};
+  Alignment result{Eigen::Vector2d::Zero(), Eigen::Vector2d::Zero(), 0.0, 0.0, 0.0, 0.0, 0.0};
   for (std::size_t i = 0; i < samples_.size(); ++i) {
     result.odometry_centroid += fix_weights[i] * samples_[i].odometry.position();
     result.map_centroid += fix_weights[i] * samples_[i].fix.position;
@@ -197,6 +199,14 @@ HeadingInitializer::Alignment HeadingInitializer::align(const std::vector<double
     add(velocities_[i].odometry, velocities_[i].measured, velocity_weights[i], result.velocity_information);
   }
   result.yaw = std::atan2(sine_sum, cosine_sum);
+  if (result.velocity_information > 0.0) {
+    double along = 0.0;
+    for (std::size_t i = 0; i < velocities_.size(); ++i) {
+      along += velocity_weights[i] *
+               velocities_[i].measured.dot(transform_point({0.0, 0.0, result.yaw}, velocities_[i].odometry));
+    }
+    result.speed_factor = along / result.velocity_information;
+  }
   return result;
 }
 
@@ -244,6 +254,10 @@ std::optional<HeadingInitializer::Consensus> HeadingInitializer::consensus() con
   fixes.weigh_by_variance(3.0);
   velocities.weigh_by_variance(1.0);
   align_all();
+  if (result.alignment.speed_factor < kMinSpeedFactor) {
+    velocities.leave_out();
+    align_all();
+  }
 
   for (std::size_t i = 0; i < samples_.size(); ++i) {
     if (fixes.weights[i] > 0.0) result.latest = i;

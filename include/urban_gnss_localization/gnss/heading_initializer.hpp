@@ -44,7 +44,8 @@ struct VelocityPair {
 /// 1. Every fix is remembered with the odometry's pose at the fix's own stamp, for `initialization_window`; every
 ///    velocity with the odometry's.
 /// 2. A Cauchy-weighted alignment, with the median residual as the scale of each kind, tells which fixes and which
-///    velocities agree with each other; one that is a kilometre off has no say.
+///    velocities agree with each other; one that is a kilometre off has no say. Nor have all velocities together
+///    where their speed along the odometry's is not its own: then one of the two is noise.
 /// 3. The alignment is repeated over those that agree, each weighted by 1 / its variance per axis: the declared one, or
 ///    larger by what the residuals of its kind say.
 /// 4. The yaw's information (1 / rad²) is the sum of these weights times squared lever arms about the centroid (fixes)
@@ -98,6 +99,7 @@ class HeadingInitializer {
     Eigen::Vector2d odometry_centroid;
     Eigen::Vector2d map_centroid;
     double yaw;                   ///< rad, of the odometry's frame in the map frame
+    double speed_factor;          ///< of the receiver's velocities along the odometry's, over the odometry's
     double information;           ///< 1 / m^2, sum of the fixes' weights
     double lever_information;     ///< 1 / rad^2, sum of the fixes' weights times squared lever arms
     double velocity_information;  ///< 1 / rad^2, sum of the velocities' weights times squared speeds
