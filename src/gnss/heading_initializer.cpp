@@ -6,12 +6,15 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "urban_gnss_localization/filters/fix_noise_model.hpp"
+
 namespace urban_gnss {
 namespace {
 
 constexpr std::size_t kMinFixes = 4;
 constexpr std::size_t kMinVelocities = 4;
 constexpr double kMinSpeed_mps = 0.3;
+constexpr double kVelocityCorrelation_s = 1.0;
 constexpr double kMinSpeedFactor = 0.7;     // noise comes this far with 0.2 % where it says to tell the yaw to 0.2 rad
 constexpr int kIterations = 20;             // the weights settle within a few
 constexpr double kCauchyTuning = 2.3849;    // 95 % efficiency where the noise is Gaussian after all
@@ -69,6 +72,11 @@ struct Observations {
     for (std::size_t i = 0; i < weights.size(); ++i) squares += weights[i] > 0.0 ? residuals[i] * residuals[i] : 0.0;
     const double too_small = std::max(1.0, squares / (2.0 * static_cast<double>(count()) - dof));
     for (std::size_t i = 0; i < weights.size(); ++i) weights[i] = weights[i] > 0.0 ? information[i] / too_small : 0.0;
+  }
+  /// Divides the weights by `inflation` of the variance, but no further than to one observation's.
+  void inflate(double inflation) {
+    const double limit = std::max(1.0, static_cast<double>(count()));
+    for (double& weight : weights) weight /= std::min(limit, inflation);
   }
   std::size_t count() const {
     return static_cast<std::size_t>(std::count_if(weights.begin(), weights.end(), [](double w) { return w > 0.0; }));
@@ -256,8 +264,10 @@ std::optional<HeadingInitializer::Consensus> HeadingInitializer::consensus() con
   align_all();
   if (result.alignment.speed_factor < kMinSpeedFactor) {
     velocities.leave_out();
-    align_all();
+  } else {
+    velocities.inflate(velocity_inflation());
   }
+  align_all();
 
   for (std::size_t i = 0; i < samples_.size(); ++i) {
     if (fixes.weights[i] > 0.0) result.latest = i;
@@ -268,6 +278,12 @@ std::optional<HeadingInitializer::Consensus> HeadingInitializer::consensus() con
   result.yaw_variance = 1.0 / (alignment.lever_information + alignment.velocity_information);
   result.velocity_yaw_variance = 1.0 / alignment.velocity_information;
   return result;
+}
+
+double HeadingInitializer::velocity_inflation() const {
+  if (velocities_.size() < 2) return 1.0;
+  const double span_s = to_seconds(velocities_.back().stamp - velocities_.front().stamp);
+  return markov_inflation(span_s / static_cast<double>(velocities_.size() - 1), kVelocityCorrelation_s);
 }
 
 double HeadingInitializer::distance_moved() const {

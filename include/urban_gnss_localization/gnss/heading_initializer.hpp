@@ -51,7 +51,7 @@ struct VelocityPair {
 /// 4. The yaw's information (1 / rad²) is the sum of these weights times squared lever arms about the centroid (fixes)
 ///    and times squared speeds (velocities); the centroid's variance is 1 / the sum of the fixes' weights.
 ///
-/// All errors are taken as independent. A bias that the fixes share is not seen; it stays in the position and is not in
+/// The errors of fixes are taken as independent, those of velocities as a Markov process of 1 s. A bias that the fixes share is not seen; it stays in the position and is not in
 /// the covariance. The odometry's heading is taken to be right within the window.
 class HeadingInitializer {
  public:
@@ -118,6 +118,8 @@ class HeadingInitializer {
   std::vector<double> fix_residuals(const Alignment& alignment) const;
   std::vector<double> velocity_residuals(const Alignment& alignment) const;
   std::optional<Consensus> consensus() const;
+  /// By which the mean of the velocities' correlated errors varies more than that of independent ones.
+  double velocity_inflation() const;
   double distance_moved() const;
   bool is_known_by_velocities(const Consensus& found) const;
   bool is_converged(const Consensus& found) const;
