@@ -23,7 +23,7 @@ noetic_packages="
   ros-noetic-message-runtime ros-noetic-nav-msgs ros-noetic-nodelet ros-noetic-pluginlib ros-noetic-rosbag ros-noetic-rosbag-storage ros-noetic-rosbash
   ros-noetic-roscpp ros-noetic-rosgraph-msgs ros-noetic-roslaunch ros-noetic-roslib ros-noetic-rosnode ros-noetic-rospy
   ros-noetic-rostest ros-noetic-rostopic ros-noetic-rviz ros-noetic-sensor-msgs ros-noetic-std-msgs ros-noetic-std-srvs
-  ros-noetic-tf2 ros-noetic-tf2-msgs ros-noetic-tf2-ros ros-noetic-visualization-msgs"
+  ros-noetic-tf2 ros-noetic-tf2-msgs ros-noetic-tf2-ros ros-noetic-topic-tools ros-noetic-visualization-msgs"
 
 usage() { sed -n '2,/^set /{/^set /d;s/^# \{0,1\}//;p}' "$0"; }
 

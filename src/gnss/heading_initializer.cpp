@@ -6,20 +6,87 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "urban_gnss_localization/filters/fix_noise_model.hpp"
+
 namespace urban_gnss {
 namespace {
 
 constexpr std::size_t kMinFixes = 4;
+constexpr std::size_t kMinVelocities = 4;
+constexpr double kMinSpeed_mps = 0.3;
+constexpr double kVelocityCorrelation_s = 1.0;
+constexpr double kMinSpeedFactor = 0.7;     // noise comes this far with 0.2 % where it says to tell the yaw to 0.2 rad
 constexpr int kIterations = 20;             // the weights settle within a few
 constexpr double kCauchyTuning = 2.3849;    // 95 % efficiency where the noise is Gaussian after all
 constexpr double kRayleighMedian = 1.1774;  // median length of a 2-D vector with unit variance per axis
-constexpr double kMaxOdometry_m = 1e8;      // farther than round the Earth; squares stay finite
+constexpr double kMaxNumber = 1e8;          // in m farther than round the Earth; squares stay finite
 constexpr double kAgreement = 9.2103;       // chi-square quantile, 99 %, 2 degrees of freedom
 
 double upper_median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
   return *middle;
+}
+
+/// Observations of one kind, on the way to those that agree with each other.
+struct Observations {
+  std::size_t minimum;              ///< fewer are none
+  std::vector<double> information;  ///< 1 / the declared variance per axis
+  std::vector<double> weights;
+  std::vector<double> residuals;  ///< in declared standard deviations
+
+  template <class Samples, class CovarianceOf>
+  Observations(std::size_t least, const Samples& samples, const CovarianceOf& covariance_of) : minimum(least) {
+    for (const auto& sample : samples) information.push_back(2.0 / covariance_of(sample).trace());
+    weights = information;
+    if (information.size() < minimum) leave_out();
+  }
+
+  /// `lengths` of the residuals.
+  void set_residuals(std::vector<double> lengths) {
+    residuals = std::move(lengths);
+    for (std::size_t i = 0; i < residuals.size(); ++i) residuals[i] *= std::sqrt(information[i]);
+  }
+  /// Factor on the declared standard deviations, by the median residual.
+  double scale() const { return residuals.empty() ? 1.0 : std::max(1.0, upper_median(residuals) / kRayleighMedian); }
+  void weigh_by_cauchy() {
+    if (information.size() < minimum) return;
+    const double s = scale();
+    for (std::size_t i = 0; i < weights.size(); ++i) {
+      weights[i] = information[i] / (s * s * (1.0 + std::pow(residuals[i] / (kCauchyTuning * s), 2)));
+    }
+  }
+  /// Gives weight to those that agree, and to none where they are too few.
+  void keep_agreeing() {
+    const double s = scale();
+    for (std::size_t i = 0; i < weights.size(); ++i) {
+      weights[i] = weights[i] > 0.0 && residuals[i] <= std::sqrt(kAgreement) * s ? information[i] / (s * s) : 0.0;
+    }
+    if (count() < minimum) leave_out();
+  }
+  void leave_out() { weights.assign(weights.size(), 0.0); }
+  /// Weights by the declared variances, or by those that the residuals say where these are larger. Of two coordinates
+  /// each, the estimation has taken `dof` degrees of freedom.
+  void weigh_by_variance(double dof) {
+    double squares = 0.0;
+    for (std::size_t i = 0; i < weights.size(); ++i) squares += weights[i] > 0.0 ? residuals[i] * residuals[i] : 0.0;
+    const double too_small = std::max(1.0, squares / (2.0 * static_cast<double>(count()) - dof));
+    for (std::size_t i = 0; i < weights.size(); ++i) weights[i] = weights[i] > 0.0 ? information[i] / too_small : 0.0;
+  }
+  /// Divides the weights by `inflation` of the variance, but no further than to one observation's.
+  void inflate(double inflation) {
+    const double limit = std::max(1.0, static_cast<double>(count()));
+    for (double& weight : weights) weight /= std::min(limit, inflation);
+  }
+  std::size_t count() const {
+    return static_cast<std::size_t>(std::count_if(weights.begin(), weights.end(), [](double w) { return w > 0.0; }));
+  }
+};
+
+/// Whether a covariance can be a weight.
+bool is_variance(const Eigen::Matrix2d& covariance) {
+  const double information = 2.0 / covariance.trace();
+  return covariance.allFinite() && std::isfinite(information) && information > 0.0;
 }
 
 double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
@@ -31,14 +98,27 @@ void HeadingInitializerParameters::check(std::vector<std::string>&) const {}
 HeadingInitializer::HeadingInitializer(HeadingInitializerParameters parameters) : parameters_(parameters) {}
 
 void HeadingInitializer::add(const Pose2& odometry_pose_at_fix, const LocalFix& fix) {
-  const double information = 2.0 / fix.covariance.trace();
-  const bool is_usable =
-      is_finite(odometry_pose_at_fix) && odometry_pose_at_fix.position().lpNorm<Eigen::Infinity>() < kMaxOdometry_m &&
-      fix.position.allFinite() && fix.covariance.allFinite() && std::isfinite(information) && information > 0.0;
+  const bool is_usable = is_finite(odometry_pose_at_fix) &&
+                         odometry_pose_at_fix.position().lpNorm<Eigen::Infinity>() < kMaxNumber &&
+                         fix.position.allFinite() && is_variance(fix.covariance);
   if (!is_usable || (!samples_.empty() && fix.stamp <= samples_.back().fix.stamp)) return;
   if (!first_stamp_) first_stamp_ = fix.stamp;
-  samples_.push_back({odometry_pose_at_fix, fix, information});
-  while (to_seconds(fix.stamp - samples_.front().fix.stamp) > parameters_.initialization_window) samples_.pop_front();
+  samples_.push_back({odometry_pose_at_fix, fix});
+  const auto is_forgotten = [&](Stamp stamp) {
+    return to_seconds(fix.stamp - stamp) > parameters_.initialization_window;
+  };
+  while (is_forgotten(samples_.front().fix.stamp)) samples_.pop_front();
+  while (!velocities_.empty() && is_forgotten(velocities_.front().stamp)) velocities_.pop_front();
+}
+
+void HeadingInitializer::add_velocity(const VelocityPair& pair) {
+  const double speed_mps = pair.odometry.norm();
+  const bool is_usable = std::isfinite(speed_mps) && speed_mps >= kMinSpeed_mps && speed_mps < kMaxNumber &&
+                         pair.measured.norm() < kMaxNumber && is_variance(pair.covariance);
+  if (!is_usable || (!velocities_.empty() && pair.stamp <= velocities_.back().stamp)) return;
+  velocities_.push_back(pair);
+  while (to_seconds(pair.stamp - velocities_.front().stamp) > parameters_.initialization_window)
+    velocities_.pop_front();
 }
 
 std::optional<PoseEstimate> HeadingInitializer::estimate() const {
@@ -81,6 +161,7 @@ bool HeadingInitializer::timed_out() const {
 
 void HeadingInitializer::reset() {
   samples_.clear();
+  velocities_.clear();
   first_stamp_.reset();
 }
 
@@ -90,7 +171,7 @@ std::string HeadingInitializer::waiting_for() const {
   out << std::fixed << std::setprecision(1);
   if (!found) {
     out << "heading: fewer than " << kMinFixes << " agreeing fixes";
-  } else if (distance_moved() <= 2.0 * found->noise_sigma) {
+  } else if (distance_moved() <= 2.0 * found->noise_sigma && !is_known_by_velocities(*found)) {
     out << "heading: moved " << distance_moved() << " of " << 2.0 * found->noise_sigma << " m";
   } else if (!is_converged(*found)) {
     out << std::setprecision(2) << "heading: sigma " << std::sqrt(found->yaw_variance) << " rad, needed "
@@ -99,12 +180,13 @@ std::string HeadingInitializer::waiting_for() const {
   return out.str();
 }
 
-HeadingInitializer::Alignment HeadingInitializer::align(const std::vector<double>& weights) const {
-  Alignment result{Eigen::Vector2d::Zero(), Eigen::Vector2d::Zero(), 0.0, 0.0, 0.0};
+HeadingInitializer::Alignment HeadingInitializer::align(const std::vector<double>& fix_weights,
+                                                        const std::vector<double>& velocity_weights) const {
+  Alignment result{Eigen::Vector2d::Zero(), Eigen::Vector2d::Zero(), 0.0, 0.0, 0.0, 0.0, 0.0};
   for (std::size_t i = 0; i < samples_.size(); ++i) {
-    result.odometry_centroid += weights[i] * samples_[i].odometry.position();
-    result.map_centroid += weights[i] * samples_[i].fix.position;
-    result.information += weights[i];
+    result.odometry_centroid += fix_weights[i] * samples_[i].odometry.position();
+    result.map_centroid += fix_weights[i] * samples_[i].fix.position;
+    result.information += fix_weights[i];
   }
   result.odometry_centroid /= result.information;
   result.map_centroid /= result.information;
@@ -112,24 +194,46 @@ HeadingInitializer::Alignment HeadingInitializer::align(const std::vector<double
   // In the plane the rotation that minimises the squared distances needs no decomposition.
   double cosine_sum = 0.0;
   double sine_sum = 0.0;
+  const auto add = [&](const Eigen::Vector2d& from, const Eigen::Vector2d& to, double weight, double& information) {
+    cosine_sum += weight * from.dot(to);
+    sine_sum += weight * cross(from, to);
+    information += weight * from.squaredNorm();
+  };
   for (std::size_t i = 0; i < samples_.size(); ++i) {
-    const Eigen::Vector2d from = samples_[i].odometry.position() - result.odometry_centroid;
-    const Eigen::Vector2d to = samples_[i].fix.position - result.map_centroid;
-    cosine_sum += weights[i] * from.dot(to);
-    sine_sum += weights[i] * cross(from, to);
-    result.lever_information += weights[i] * from.squaredNorm();
+    add(samples_[i].odometry.position() - result.odometry_centroid, samples_[i].fix.position - result.map_centroid,
+        fix_weights[i], result.lever_information);
+  }
+  for (std::size_t i = 0; i < velocities_.size(); ++i) {
+    add(velocities_[i].odometry, velocities_[i].measured, velocity_weights[i], result.velocity_information);
   }
   result.yaw = std::atan2(sine_sum, cosine_sum);
+  if (result.velocity_information > 0.0) {
+    double along = 0.0;
+    for (std::size_t i = 0; i < velocities_.size(); ++i) {
+      along += velocity_weights[i] *
+               velocities_[i].measured.dot(transform_point({0.0, 0.0, result.yaw}, velocities_[i].odometry));
+    }
+    result.speed_factor = along / result.velocity_information;
+  }
   return result;
 }
 
-std::vector<double> HeadingInitializer::normalised_residuals(const Alignment& alignment) const {
+std::vector<double> HeadingInitializer::fix_residuals(const Alignment& alignment) const {
   const Pose2 rotation{0.0, 0.0, alignment.yaw};
   std::vector<double> residuals;
   for (const Sample& sample : samples_) {
     const Eigen::Vector2d lever = sample.odometry.position() - alignment.odometry_centroid;
     const Eigen::Vector2d predicted = alignment.map_centroid + transform_point(rotation, lever);
-    residuals.push_back((sample.fix.position - predicted).norm() * std::sqrt(sample.information));
+    residuals.push_back((sample.fix.position - predicted).norm());
+  }
+  return residuals;
+}
+
+std::vector<double> HeadingInitializer::velocity_residuals(const Alignment& alignment) const {
+  const Pose2 rotation{0.0, 0.0, alignment.yaw};
+  std::vector<double> residuals;
+  for (const VelocityPair& pair : velocities_) {
+    residuals.push_back((pair.measured - transform_point(rotation, pair.odometry)).norm());
   }
   return residuals;
 }
@@ -137,43 +241,49 @@ std::vector<double> HeadingInitializer::normalised_residuals(const Alignment& al
 std::optional<HeadingInitializer::Consensus> HeadingInitializer::consensus() const {
   if (samples_.size() < kMinFixes) return std::nullopt;
 
-  std::vector<double> weights;
-  for (const Sample& sample : samples_) weights.push_back(sample.information);
-  std::vector<double> residuals = normalised_residuals(align(weights));
-  const auto scale = [&] { return std::max(1.0, upper_median(residuals) / kRayleighMedian); };
-  for (int iteration = 0; iteration < kIterations; ++iteration) {
-    const double width = kCauchyTuning * scale();
-    for (std::size_t i = 0; i < samples_.size(); ++i) {
-      weights[i] = samples_[i].information / (1.0 + std::pow(residuals[i] / width, 2));
-    }
-    residuals = normalised_residuals(align(weights));
-  }
-
+  Observations fixes(kMinFixes, samples_, [](const Sample& sample) { return sample.fix.covariance; });
+  Observations velocities(kMinVelocities, velocities_, [](const VelocityPair& pair) { return pair.covariance; });
   Consensus result{};
-  const double limit = std::sqrt(kAgreement) * scale();
-  for (std::size_t i = 0; i < samples_.size(); ++i) {
-    const bool agrees = residuals[i] <= limit;
-    weights[i] = agrees ? samples_[i].information : 0.0;
-    if (agrees) {
-      ++result.count;
-      result.latest = i;
-    }
+  const auto align_all = [&] {
+    result.alignment = align(fixes.weights, velocities.weights);
+    fixes.set_residuals(fix_residuals(result.alignment));
+    velocities.set_residuals(velocity_residuals(result.alignment));
+  };
+  align_all();
+  for (int iteration = 0; iteration < kIterations; ++iteration) {
+    fixes.weigh_by_cauchy();
+    velocities.weigh_by_cauchy();
+    align_all();
   }
-  if (result.count < kMinFixes) return std::nullopt;
+  fixes.keep_agreeing();
+  velocities.keep_agreeing();
+  if (fixes.count() == 0) return std::nullopt;
+  align_all();
+  fixes.weigh_by_variance(3.0);
+  velocities.weigh_by_variance(1.0);
+  align_all();
+  if (result.alignment.speed_factor < kMinSpeedFactor) {
+    velocities.leave_out();
+  } else {
+    velocities.inflate(velocity_inflation());
+  }
+  align_all();
 
-  result.alignment = align(weights);
-  residuals = normalised_residuals(result.alignment);
-  double squared_residuals = 0.0;
   for (std::size_t i = 0; i < samples_.size(); ++i) {
-    if (weights[i] > 0.0) squared_residuals += residuals[i] * residuals[i];
+    if (fixes.weights[i] > 0.0) result.latest = i;
   }
-  // Two coordinates a fix, less the three of the alignment.
-  const auto count = static_cast<double>(result.count);
-  const double declared_too_small = std::max(1.0, squared_residuals / (2.0 * count - 3.0));
-  result.noise_sigma = std::sqrt(declared_too_small * count / result.alignment.information);
-  result.position_variance = declared_too_small / result.alignment.information;
-  result.yaw_variance = declared_too_small / result.alignment.lever_information;
+  const Alignment& alignment = result.alignment;
+  result.noise_sigma = std::sqrt(static_cast<double>(fixes.count()) / alignment.information);
+  result.position_variance = 1.0 / alignment.information;
+  result.yaw_variance = 1.0 / (alignment.lever_information + alignment.velocity_information);
+  result.velocity_yaw_variance = 1.0 / alignment.velocity_information;
   return result;
+}
+
+double HeadingInitializer::velocity_inflation() const {
+  if (velocities_.size() < 2) return 1.0;
+  const double span_s = to_seconds(velocities_.back().stamp - velocities_.front().stamp);
+  return markov_inflation(span_s / static_cast<double>(velocities_.size() - 1), kVelocityCorrelation_s);
 }
 
 double HeadingInitializer::distance_moved() const {
@@ -184,8 +294,12 @@ double HeadingInitializer::distance_moved() const {
   return farthest;
 }
 
+bool HeadingInitializer::is_known_by_velocities(const Consensus& found) const {
+  return std::sqrt(found.velocity_yaw_variance) < parameters_.initialization_heading_sigma;
+}
+
 bool HeadingInitializer::is_converged(const Consensus& found) const {
-  return distance_moved() > 2.0 * found.noise_sigma &&
+  return (distance_moved() > 2.0 * found.noise_sigma || is_known_by_velocities(found)) &&
          std::sqrt(found.yaw_variance) < parameters_.initialization_heading_sigma;
 }
 

@@ -6,6 +6,8 @@ namespace urban_gnss {
 
 /// How long a pipeline remembers odometry, yaw rates and estimates.
 inline constexpr double kHistory_s = 10.0;
+/// A fix, velocity or yaw rate that is farther ahead of the odometry than this has a wrong stamp.
+inline constexpr double kMaxAhead_s = 10.0;
 /// How many fixes, or biases, may wait for what they need; the oldest go first.
 inline constexpr std::size_t kMaxWaitingFixes = 1000;
 

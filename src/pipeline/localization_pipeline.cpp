@@ -9,13 +9,6 @@
 #include "urban_gnss_localization/filters/unscented.hpp"
 
 namespace urban_gnss {
-namespace {
-
-/// A fix that is farther ahead of the odometry than this has a wrong stamp.
-constexpr double kMaxAhead_s = 10.0;
-constexpr double kMaxSpeed_mps = 150.0;
-
-}  // namespace
 
 void LocalizationParameters::check(std::vector<std::string>& faults) const {
   if (!initial_pose.empty() && initial_pose.size() != 3) {
@@ -54,6 +47,9 @@ void LocalizationPipeline::reset(const std::string& why) {
   ++epoch_;
   last_odometry_.reset();
   imu_yaw_rates_.clear();
+  yaw_rate_check_.emplace();
+  without_imu_s_ = 0.0;
+  imu_is_silent_ = true;
   before_datum_.clear();
   pending_.clear();
   pending_velocities_.clear();
@@ -68,6 +64,7 @@ void LocalizationPipeline::reset(const std::string& why) {
   last_verdict_ = {};
   fixes_used_ = 0;
   fixes_rejected_ = 0;
+  velocities_used_ = 0;
   start_.reset();
   if (parameters_.initial_pose.size() == 3) {
     PoseEstimate start;
@@ -90,31 +87,6 @@ bool LocalizationPipeline::is_new(StampMonitor& monitor, Stamp stamp, const char
     for (StampMonitor* each : {&odometry_stamps_, &fix_stamps_, &imu_stamps_, &velocity_stamps_}) each->reset();
     return true;
   });
-}
-
-void LocalizationPipeline::add_imu_yaw_rate(Stamp stamp, double yaw_rate_radps) {
-  OdometrySample as_odometry;
-  as_odometry.twist.yaw_rate_radps = yaw_rate_radps;
-  if (!odometry_fault(as_odometry).empty()) return;
-  if (!is_new(imu_stamps_, stamp, "IMU")) return;
-  imu_yaw_rates_.emplace_back(stamp, yaw_rate_radps);
-  while (imu_yaw_rates_.size() > 1 && to_seconds(stamp - imu_yaw_rates_.front().first) > kHistory_s) {
-    imu_yaw_rates_.pop_front();
-  }
-}
-
-Twist2 LocalizationPipeline::with_imu(const OdometrySample& sample, Stamp since) {
-  Twist2 twist = sample.twist;
-  if (!parameters_.use_imu_yaw_rate) return twist;
-  double sum = 0.0;
-  int count = 0;
-  for (const auto& [stamp, rate] : imu_yaw_rates_) {
-    if (stamp <= since || stamp > sample.stamp) continue;
-    sum += rate;
-    ++count;
-  }
-  if (count > 0) twist.yaw_rate_radps = sum / count;
-  return twist;
 }
 
 void LocalizationPipeline::add_odometry(const OdometrySample& sample) {
@@ -170,49 +142,6 @@ void LocalizationPipeline::add_fix(const RawFix& fix) {
   }
   sanitize(fix);
   process_fixes();
-}
-
-void LocalizationPipeline::add_velocity(const RawVelocity& raw) {
-  if (!parameters_.use_gps_velocity) return;
-  if (!raw.velocity.allFinite() || raw.velocity.norm() > kMaxSpeed_mps) {
-    event(PipelineEvent::Level::kWarn, "velocity of the receiver left out: not finite, or beyond 150 m/s");
-    return;
-  }
-  if (last_odometry_ && to_seconds(raw.stamp - last_odometry_->stamp) > kMaxAhead_s) {
-    event(PipelineEvent::Level::kWarn,
-          "velocity of the receiver left out: more than " + seconds_text(kMaxAhead_s) + " ahead of the odometry");
-    return;
-  }
-  if (!is_new(velocity_stamps_, raw.stamp, "velocities")) return;
-  RawVelocity velocity = raw;
-  const double floor = parameters_.velocity_sigma_floor;
-  const double fallback = parameters_.velocity_sigma_default;
-  if (is_positive_definite<2>(raw.covariance)) {
-    velocity.covariance += floor * floor * Eigen::Matrix2d::Identity();
-  } else {
-    velocity.covariance = fallback * fallback * Eigen::Matrix2d::Identity();
-  }
-  if (pending_velocities_.size() >= kMaxWaitingFixes) pending_velocities_.pop_front();
-  pending_velocities_.push_back(velocity);
-  process_velocities();
-}
-
-void LocalizationPipeline::process_velocities() {
-  while (!pending_velocities_.empty() && !history_.empty() && pending_velocities_.front().stamp <= history_.latest()) {
-    const RawVelocity velocity = pending_velocities_.front();
-    pending_velocities_.pop_front();
-    const auto motion = history_.motion_between(history_.latest(), velocity.stamp);
-    if (!initialized_ || !motion) continue;
-    const Twist2 twist = *history_.twist_at(velocity.stamp);
-    const Eigen::Vector2d lever = antenna_offset();
-    const Eigen::Vector2d then(twist.speed_mps - twist.yaw_rate_radps * lever.y(), twist.yaw_rate_radps * lever.x());
-    VelocityMeasurement measurement;
-    measurement.velocity = velocity.velocity;
-    measurement.covariance = velocity.covariance;
-    measurement.antenna_velocity_in_body = transform_point({0.0, 0.0, motion->yaw}, then);
-    localizer_->correct_velocity(measurement);
-    guard_against_non_finite();
-  }
 }
 
 void LocalizationPipeline::sanitize(const RawFix& fix) {

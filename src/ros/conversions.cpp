@@ -95,15 +95,22 @@ OdometrySample to_odometry_sample(const nav_msgs::Odometry& message) {
   return sample;
 }
 
-RawVelocity to_raw_velocity(const geometry_msgs::TwistWithCovarianceStamped& message) {
-  constexpr int kDimension = 6;
+RawVelocity to_raw_velocity(const geometry_msgs::TwistStamped& message) {
   RawVelocity velocity;
   velocity.stamp = to_stamp(message.header.stamp);
-  velocity.velocity = {message.twist.twist.linear.x, message.twist.twist.linear.y};
+  velocity.velocity = {message.twist.linear.x, message.twist.linear.y};
+  return velocity;
+}
+
+RawVelocity to_raw_velocity(const geometry_msgs::TwistWithCovarianceStamped& message) {
+  constexpr int kDimension = 6;
+  geometry_msgs::TwistStamped twist;
+  twist.header = message.header;
+  twist.twist = message.twist.twist;
+  RawVelocity velocity = to_raw_velocity(twist);
   for (int row = 0; row < 2; ++row) {
     for (int column = 0; column < 2; ++column) {
-      velocity.covariance(row, column) =
-          message.twist.covariance[static_cast<std::size_t>(kDimension * row + column)];
+      velocity.covariance(row, column) = message.twist.covariance[static_cast<std::size_t>(kDimension * row + column)];
     }
   }
   return velocity;
@@ -259,6 +266,7 @@ msgs::LocalizationStatus to_message(const LocalizationReport& report, const Loca
   message.last_fix = to_message(report.last_fix);
   message.fixes_used = report.fixes_used;
   message.fixes_rejected = report.fixes_rejected;
+  message.velocities_used = report.velocities_used;
   message.fix_age = report.fix_age_s;
   message.odometry_age = report.odometry_age_s;
   message.position_sigma = report.position_sigma_m;

@@ -35,6 +35,9 @@ LocalizerNode::LocalizerNode(ros::NodeHandle& node, ros::NodeHandle& private_nod
   if (pipeline_.localizer().wants_bias()) {
     subscribers_.push_back(node.subscribe(topics::kBias, 100, &Self::on_bias, this, kNoDelay));
   }
+  if (pipeline_.takes_velocity()) {
+    subscribers_.push_back(node.subscribe(topics::kVelocity, 100, &Self::on_velocity, this, kNoDelay));
+  }
   if (parameters_.localization.use_imu_yaw_rate) {
     subscribers_.push_back(node.subscribe(topics::kImu, 1000, &Self::on_imu, this, kNoDelay));
   }
@@ -66,6 +69,17 @@ void LocalizerNode::on_odometry(const nav_msgs::Odometry& message) {
 void LocalizerNode::on_fix(const sensor_msgs::NavSatFix& message) {
   fix_watch_.observe_frame(message.header.frame_id);
   pipeline_.add_fix(to_raw_fix(message));
+  publish_results();
+}
+
+void LocalizerNode::on_velocity(const topic_tools::ShapeShifter& message) {
+  const auto velocity = to_raw_velocity_of(message);
+  if (!velocity) {
+    ROS_ERROR_STREAM_THROTTLE(
+        5.0, topics::kVelocity << " left out: is " << message.getDataType() << ", must be " << kVelocityTypes);
+    return;
+  }
+  pipeline_.add_velocity(*velocity);
   publish_results();
 }
 
@@ -263,6 +277,7 @@ void LocalizerNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status
   status.add("fixes used", report.fixes_used);
   status.add("fixes rejected", report.fixes_rejected);
   status.add("fix age (s)", report.fix_age_s);
+  status.add("velocities used", report.velocities_used);
   status.add("position sigma (m)", report.position_sigma_m);
   status.add("heading sigma (rad)", report.health.heading_sigma_rad);
   status.add("bias radius (m)", report.bias_radius_m);

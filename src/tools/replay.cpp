@@ -1,7 +1,6 @@
 // Runs a bag through the same core as the live nodes: offline, deterministic, as fast as the machine can.
 
 #include <rosbag/bag.h>
-#include <rosbag/view.h>
 #include <tf2_msgs/TFMessage.h>
 
 #include <CLI/CLI.hpp>
@@ -14,6 +13,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "bag_messages.hpp"
 #include "output_file.hpp"
 #include "urban_gnss_localization/common/progress.hpp"
 #include "urban_gnss_localization/evaluation/report_json.hpp"
@@ -39,8 +39,10 @@ struct Options {
   std::string output;
   std::string fix_topic = topics::kFix;
   std::string odom_topic = topics::kOdometry;
-  std::string imu_topic;
+  std::string imu_topic = topics::kImu;
+  bool wants_imu = false;  ///< imu_topic was asked for
   std::string velocity_topic = topics::kVelocity;
+  bool wants_velocity = false;  ///< velocity_topic was asked for
   std::string truth_topic = topics::kTruth;
   std::vector<double> datum;
   int seed = -1;
@@ -85,13 +87,13 @@ YAML::Node merge_parameters(const Options& options) {
     }
     if (map.IsMap()) merge(map);
   }
+  if (options.wants_imu) merged["use_imu_yaw_rate"] = true;
   for (const std::string& text : options.overrides) {
     const auto equal = text.find('=');
     if (equal == std::string::npos) throw std::runtime_error("--set " + text + ": must be NAME=VALUE");
     merged[text.substr(0, equal)] = YAML::Load(text.substr(equal + 1));
   }
   if (options.seed >= 0) merged["seed"] = options.seed;
-  if (!options.imu_topic.empty()) merged["use_imu_yaw_rate"] = true;
   if (!options.datum.empty()) merged["datum"] = options.datum;
   return merged;
 }
@@ -117,41 +119,6 @@ Parameters read_parameters(const Options& options) {
   return parameters;
 }
 
-/// The messages of the bag in a fixed order: by the time they were recorded, then by what they are (as in `names`).
-std::vector<rosbag::MessageInstance> ordered_messages(const rosbag::Bag& bag, const std::vector<std::string>& names) {
-  rosbag::View view(bag, [&](const rosbag::ConnectionInfo* connection) {
-    return std::find(names.begin(), names.end(), without_leading_slash(connection->topic)) != names.end();
-  });
-  const std::vector<rosbag::MessageInstance> as_read(view.begin(), view.end());
-  struct Key {
-    ros::Time time;
-    std::ptrdiff_t rank;
-    std::size_t index;
-  };
-  std::vector<Key> keys;
-  keys.reserve(as_read.size());
-  for (std::size_t i = 0; i < as_read.size(); ++i) {
-    const auto name = std::find(names.begin(), names.end(), without_leading_slash(as_read[i].getTopic()));
-    keys.push_back({as_read[i].getTime(), name - names.begin(), i});
-  }
-  std::stable_sort(keys.begin(), keys.end(),
-                   [](const Key& a, const Key& b) { return a.time != b.time ? a.time < b.time : a.rank < b.rank; });
-  std::vector<rosbag::MessageInstance> messages;
-  messages.reserve(keys.size());
-  for (const Key& key : keys) messages.push_back(as_read[key.index]);
-  return messages;
-}
-
-template <class M>
-boost::shared_ptr<M> expect(const rosbag::MessageInstance& message) {
-  const auto typed = message.instantiate<M>();
-  if (!typed) {
-    throw std::runtime_error(message.getTopic() + ": is " + message.getDataType() + ", must be " +
-                             ros::message_traits::DataType<M>::value());
-  }
-  return typed;
-}
-
 /// The pipeline and the bias filter of one run, with what it writes.
 class Replay {
  public:
@@ -175,8 +142,8 @@ class Replay {
     pipeline_.add_fix(to_raw_fix(message));
     settle();
   }
-  void add_velocity(const geometry_msgs::TwistWithCovarianceStamped& message) {
-    pipeline_.add_velocity(to_raw_velocity(message));
+  void add_velocity(const RawVelocity& velocity) {
+    pipeline_.add_velocity(velocity);
     settle();
   }
   void add_imu(const sensor_msgs::Imu& message) {
@@ -311,17 +278,19 @@ void run(const Options& options) {
     return std::count_if(messages.begin(), messages.end(),
                          [&](const auto& message) { return without_leading_slash(message.getTopic()) == name; });
   };
-  for (const auto& [option, name] :
-       {std::pair("--fix-topic", fix), std::pair("--odom-topic", odom), std::pair("--imu-topic", imu)}) {
-    if (!name.empty() && count(name) == 0) {
-      std::string present;
-      rosbag::View all(bag);
-      for (const rosbag::ConnectionInfo* connection : all.getConnections()) {
-        present += "\n  " + connection->topic + " (" + connection->datatype + ")";
-      }
-      throw std::runtime_error(options.input + " has no message on " + name + " (" + option + "); it has" + present);
+  const auto require = [&](const std::string& option, const std::string& name) {
+    if (count(name) > 0) return;
+    std::string present;
+    rosbag::View all(bag);
+    for (const rosbag::ConnectionInfo* connection : all.getConnections()) {
+      present += "\n  " + connection->topic + " (" + connection->datatype + ")";
     }
-  }
+    throw std::runtime_error(options.input + " has no message on " + name + " (" + option + "); it has" + present);
+  };
+  require("--fix-topic", fix);
+  require("--odom-topic", odom);
+  if (options.wants_imu) require("--imu-topic", imu);
+  if (options.wants_velocity) require("--velocity-topic", velocity);
 
   Replay replay(options, parameters);
   Progress progress(messages.size(), "messages");
@@ -334,7 +303,9 @@ void run(const Options& options) {
     } else if (name == fix) {
       replay.add_fix(*expect<sensor_msgs::NavSatFix>(message));
     } else if (name == velocity) {
-      replay.add_velocity(*expect<geometry_msgs::TwistWithCovarianceStamped>(message));
+      const auto measured = to_raw_velocity_of(message);
+      if (!measured) throw wrong_type(message, kVelocityTypes);
+      replay.add_velocity(*measured);
     } else if (name == imu) {
       replay.add_imu(*expect<sensor_msgs::Imu>(message));
     } else if (name == truth) {
@@ -354,7 +325,8 @@ void run(const Options& options) {
                             {"mode", replay.pipeline().localizer().mode()},
                             {"seed", parameters.filter.seed},
                             {"estimates", replay.estimate().size()},
-                            {"decisions", replay.decisions()}};
+                            {"decisions", replay.decisions()},
+                            {"velocities_used", report.velocities_used}};
   metrics["final_state"] = to_string(report.state);
   if (const auto& frame = replay.pipeline().frame()) {
     metrics["datum"] = {frame->datum().latitude_deg, frame->datum().longitude_deg, frame->datum().altitude_m};
@@ -388,9 +360,12 @@ int main(int argc, char** argv) {
   app.add_option("--output", options.output, "bag to write: odometry/filtered, gps/bias, status, tf");
   app.add_option("--fix-topic", options.fix_topic, "sensor_msgs/NavSatFix");
   app.add_option("--odom-topic", options.odom_topic, "nav_msgs/Odometry");
-  app.add_option("--velocity-topic", options.velocity_topic,
-                 "geometry_msgs/TwistWithCovarianceStamped of the receiver, where the bag has it");
-  app.add_option("--imu-topic", options.imu_topic, "sensor_msgs/Imu whose yaw rate is used instead of the odometry's");
+  const auto* velocity_topic = app.add_option(
+      "--velocity-topic", options.velocity_topic,
+      "the receiver's velocity, east and north: " + std::string(kVelocityTypes) + ", where the bag has it; \"\": none");
+  const auto* imu_topic = app.add_option("--imu-topic", options.imu_topic,
+                                         "sensor_msgs/Imu whose yaw rate is used instead of the odometry's, where the "
+                                         "bag has it; \"\": none");
   app.add_option("--truth-topic", options.truth_topic, "nav_msgs/Odometry, for the errors only");
   app.add_option("--datum", options.datum,
                  "LAT,LON,ALT (deg, deg, m); default: the bag's gps/datum, or the first fixes")
@@ -400,6 +375,8 @@ int main(int argc, char** argv) {
   app.add_option("--json", options.json_file, "write decisions and errors here");
   app.add_option("--tum", options.tum_file, "write the trajectory here (TUM format, ENU about the datum)");
   CLI11_PARSE(app, argc, argv);
+  options.wants_velocity = velocity_topic->count() > 0 && !options.velocity_topic.empty();
+  options.wants_imu = imu_topic->count() > 0 && !options.imu_topic.empty();
   try {
     run(options);
   } catch (const std::exception& error) {

@@ -28,6 +28,8 @@ struct FakeLocalizer : Localizer {
   std::vector<PoseEstimate> starts;
   std::vector<std::pair<Twist2, double>> moves;
   std::vector<FixMeasurement> fixes;
+  bool takes{true};  ///< velocities
+  std::vector<VelocityMeasurement> velocities;
 
   const char* name() const override { return "fake"; }
   std::string mode() const override { return "fake"; }
@@ -47,6 +49,8 @@ struct FakeLocalizer : Localizer {
     verdict.decision = FixDecision::kAccepted;
     return verdict;
   }
+  bool takes_velocity() const override { return takes; }
+  void correct_velocity(const VelocityMeasurement& velocity) override { velocities.push_back(velocity); }
   Pose2 pose() const override { return state.pose; }
   PoseEstimate estimate() const override { return state; }
   LocalizerHealth health() const override {
@@ -86,6 +90,18 @@ struct Rig {
   void drive(double time) { pipeline.add_odometry(odometry(time)); }
   void fix(double time, const Eigen::Vector2d& error = {0.0, 0.0}, const Eigen::Vector2d& antenna = {0.0, 0.0}) {
     pipeline.add_fix(raw_fix(at(time), transform_point(truth(time), antenna) + error));
+  }
+  /// The receiver's velocity, east and north, without an error.
+  static RawVelocity velocity(double time, const Eigen::Vector2d& antenna = {0.0, 0.0}) {
+    RawVelocity velocity;
+    velocity.stamp = at(time);
+    const double yaw = truth(time).yaw;
+    const double forward = kTwist.speed_mps - kTwist.yaw_rate_radps * antenna.y();
+    const double left = kTwist.yaw_rate_radps * antenna.x();
+    velocity.velocity = {std::cos(yaw) * forward - std::sin(yaw) * left,
+                         std::sin(yaw) * forward + std::cos(yaw) * left};
+    velocity.covariance = isotropic(0.1);
+    return velocity;
   }
   /// Odometry at 10 Hz, and a fix each second unless there shall be none.
   void run(double from, double to, bool with_fixes = true) {

@@ -5,7 +5,6 @@
 #include "matchers.hpp"
 #include "urban_gnss_localization/common/random.hpp"
 #include "urban_gnss_localization/filters/fix_noise_model.hpp"
-#include "urban_gnss_localization/gnss/chi_squared.hpp"
 
 namespace urban_gnss {
 namespace {
@@ -28,10 +27,6 @@ double settled_scale(double sigma, double outlier_share, const FixNoiseModelPara
     if (k >= kCount / 2) log_sum += std::log(model.scale());
   }
   return std::exp(log_sum / (kCount / 2));
-}
-
-TEST(FixNoiseModel, MedianIsThatOfTheChiSquaredDistribution) {
-  EXPECT_NEAR(LearntScale::kMedianNis, chi_squared_quantile(0.5, 2), 1e-9);
 }
 
 TEST(FixNoiseModel, LearnsTheReceiversFactorWhateverTheOutliers) {

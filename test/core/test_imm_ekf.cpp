@@ -329,8 +329,9 @@ TEST(ImmEkf, EveryParameterHasAnEffectF36) {
       {"fix_scale_lag: 0.0", "fix_scale_rate: 0.1"},
       {"yaw_rate_scale_sigma: 0.02", "{}"},
   };
-  EXPECT_EQ(changes.size() + 3,
-            parameter_names(ImmEkfParameters{}).size());  // those of a parked robot, common_error_sigma
+  // Elsewhere: those of a parked robot, common_error_sigma, the velocity's.
+  EXPECT_EQ(changes.size() + 3 + parameter_names(VelocityNoiseParameters{}).size(),
+            parameter_names(ImmEkfParameters{}).size());
   SwitchingDrive d;
   d.bias = bias_between(20.0, 40.0, {4.0, 3.0});
   d.duration_s = 60.0;

@@ -293,8 +293,11 @@ TEST(LocalizationPipeline, ImuYawRateReplacesTheOdometrys) {
     EXPECT_EQ(rig.fake->moves[0].first.speed_mps, 2.0);
     rig.drive(0.2);
     EXPECT_NEAR(rig.fake->moves[1].first.yaw_rate_radps, use ? 5.0 : 0.1, 1e-12);
-    rig.drive(0.3);  // none came: the odometry's
-    EXPECT_NEAR(rig.fake->moves[2].first.yaw_rate_radps, 0.1, 1e-12);
+    rig.drive(0.3);  // none came: a moment before is near enough
+    EXPECT_NEAR(rig.fake->moves[2].first.yaw_rate_radps, use ? 5.0 : 0.1, 1e-12);
+    rig.drive(0.4);  // and now too long ago
+    rig.drive(0.5);
+    EXPECT_NEAR(rig.fake->moves[4].first.yaw_rate_radps, 0.1, 1e-12);
   }
 }
 
@@ -315,6 +318,11 @@ std::string trace(const std::string& base, const std::string& change, bool wants
   for (int k = 0; k <= 400; ++k) {
     const double time = 0.1 * k;
     rig.pipeline.add_imu_yaw_rate(Rig::at(time), 0.12);
+    if (k > 200) {
+      RawVelocity velocity = Rig::velocity(time);
+      if (k % 2 == 0) velocity.covariance.setZero();
+      rig.pipeline.add_velocity(velocity);
+    }
     if (k % 10 == 0 && k != 150 && (k < 160 || k > 190)) {
       const Eigen::Vector2d error(0.5 * draw_normal(noise), 0.5 * draw_normal(noise));
       RawFix fix = raw_fix(Rig::at(time), Rig::truth(time).position() + error, k % 20 == 0 ? 0.1 : 1.0);
@@ -330,6 +338,7 @@ std::string trace(const std::string& base, const std::string& change, bool wants
   for (const FixMeasurement& fix : rig.fake->fixes) {
     out << fix.antenna_in_body.transpose() << ' ' << fix.covariance(0, 0) << ' ' << fix.position.transpose() << '\n';
   }
+  for (const VelocityMeasurement& velocity : rig.fake->velocities) out << velocity.covariance(0, 0) << '\n';
   for (const PoseEstimate& start : rig.fake->starts) out << start.pose.x << ' ' << start.covariance << '\n';
   rig.run(0.0, 1.0);
   note();
@@ -345,7 +354,10 @@ TEST(LocalizationPipeline, EveryParameterHasAnEffectF36) {
       {"initial_position_sigma", {given, "2.0"}},
       {"initial_heading_sigma", {given, "0.1"}},
       {"antenna_offset", {given, "[1.0, 0.0]"}},
-      {"use_imu_yaw_rate", {given, "true"}},
+      {"use_imu_yaw_rate", {given, "false"}},
+      {"use_gps_velocity", {given, "false"}},
+      {"velocity_sigma_default", {given, "0.5"}},
+      {"velocity_sigma_floor", {given, "0.2"}},
       {"odometry_gap", {given, "1.0"}},
       {"max_bias_radius", {far_off, "200.0"}},
       {"lost_timeout", {far_off, "5.0"}},

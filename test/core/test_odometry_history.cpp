@@ -45,8 +45,27 @@ TEST(OdometryHistory, InterpolatesExactlyOnTheArcs) {
   }
 }
 
+TEST(OdometryHistory, TwistIsThatOfTheStepThatHoldsTheStamp) {
+  const OdometryHistory history = five_seconds();
+  const auto expect = [&](double time, int step) {
+    const auto twist = history.twist_at(from_seconds(time));
+    ASSERT_TRUE(twist) << time;
+    EXPECT_EQ(twist->speed_mps, kTwists[step].speed_mps) << time;
+    EXPECT_EQ(twist->yaw_rate_radps, kTwists[step].yaw_rate_radps) << time;
+  };
+  expect(100.0, 0);
+  expect(100.001, 1);
+  expect(101.0, 1);
+  expect(101.001, 2);
+  expect(103.5, 4);
+  expect(104.0, 4);
+}
+
 TEST(OdometryHistory, NothingOutsideOfItsTime) {
   const OdometryHistory history = five_seconds();
+  EXPECT_FALSE(history.twist_at(from_seconds(100.0) - Stamp(1)));
+  EXPECT_FALSE(history.twist_at(from_seconds(104.0) + Stamp(1)));
+  EXPECT_FALSE(OdometryHistory().twist_at(Stamp(0)));
   EXPECT_FALSE(history.pose_at(from_seconds(100.0) - Stamp(1)));
   EXPECT_FALSE(history.pose_at(from_seconds(104.0) + Stamp(1)));
   EXPECT_TRUE(history.pose_at(from_seconds(104.0)));

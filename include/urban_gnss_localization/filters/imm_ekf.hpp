@@ -73,6 +73,7 @@ class ImmEkf : public Localizer {
   void move(const Twist2& twist, double duration_s) override;
   /// kRejectedNonFinite for a fix that is not finite or has no positive definite covariance.
   FixVerdict correct(const FixMeasurement& fix) override;
+  bool takes_velocity() const override { return true; }
   /// Leaves out a velocity that cannot be used.
   void correct_velocity(const VelocityMeasurement& velocity) override;
   Pose2 pose() const override;

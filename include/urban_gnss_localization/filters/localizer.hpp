@@ -70,6 +70,8 @@ class Localizer {
   /// Takes one fix. The verdict carries the decision with its NIS.
   virtual FixVerdict correct(const FixMeasurement& fix) = 0;
 
+  /// Whether it makes use of the receiver's velocity.
+  virtual bool takes_velocity() const { return false; }
   /// Takes one velocity of the receiver; the methods that know of none leave it out.
   virtual void correct_velocity(const VelocityMeasurement& /*velocity*/) {}
 

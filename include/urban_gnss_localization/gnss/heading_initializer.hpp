@@ -30,19 +30,29 @@ struct HeadingInitializerParameters {
   void check(std::vector<std::string>& faults) const;
 };
 
+/// The velocity of the receiver's antenna, by the odometry and by the receiver, at one time.
+struct VelocityPair {
+  Stamp stamp{0};
+  Eigen::Vector2d odometry{Eigen::Vector2d::Zero()};        ///< m/s, in the odometry's frame
+  Eigen::Vector2d measured{Eigen::Vector2d::Zero()};        ///< m/s, east and north
+  Eigen::Matrix2d covariance{Eigen::Matrix2d::Identity()};  ///< (m/s)^2, of the measured one
+};
+
 /// The initial pose from motion alone, without a magnetometer: the rotation and translation that lay the path of
-/// the odometry on the fixes in the sense of least squares.
+/// the odometry on the fixes, and its velocities on the receiver's where there are any, in the sense of least squares.
 ///
-/// 1. Every fix is remembered with the odometry's pose at the fix's own stamp, for `initialization_window`.
-/// 2. A Cauchy-weighted alignment, whose scale is the median residual, tells which fixes agree with each other; one
-/// that
-///    is a kilometre off has no say.
-/// 3. The alignment is repeated over the fixes that agree, each weighted by 1 / its declared variance per axis.
-/// 4. With s² the larger of the declared and the residual variance per axis, the yaw's variance is s² / (sum of squared
-///    lever arms about the centroid), and the centroid's s² / n.
+/// 1. Every fix is remembered with the odometry's pose at the fix's own stamp, for `initialization_window`; every
+///    velocity with the odometry's.
+/// 2. A Cauchy-weighted alignment, with the median residual as the scale of each kind, tells which fixes and which
+///    velocities agree with each other; one that is a kilometre off has no say. Nor have all velocities together
+///    where their speed along the odometry's is not its own: then one of the two is noise.
+/// 3. The alignment is repeated over those that agree, each weighted by 1 / its variance per axis: the declared one, or
+///    larger by what the residuals of its kind say.
+/// 4. The yaw's information (1 / rad²) is the sum of these weights times squared lever arms about the centroid (fixes)
+///    and times squared speeds (velocities); the centroid's variance is 1 / the sum of the fixes' weights.
 ///
-/// The errors of the fixes are taken as independent of each other. A bias that they share is not seen; it stays in
-/// the position and is not in the covariance.
+/// The errors of fixes are taken as independent, those of velocities as a Markov process of 1 s. A bias that the fixes share is not seen; it stays in the position and is not in
+/// the covariance. The odometry's heading is taken to be right within the window.
 class HeadingInitializer {
  public:
   /// Requires parameters without faults.
@@ -54,9 +64,14 @@ class HeadingInitializer {
   /// newer than the last.
   void add(const Pose2& odometry_pose_at_fix, const LocalFix& fix);
 
+  /// Ignored where something is not finite, the variance is not positive, the stamp is not newer than the last
+  /// velocity's, or the odometry is slower than 0.3 m/s: the jitter of a parked robot's has no direction.
+  void add_velocity(const VelocityPair& pair);
+
   /// The pose in the map frame, of the same point as in add(), at the last fix's stamp; its position is the
-  /// alignment's, not that fix's. Nothing until the yaw's standard deviation is below the limit, at least 4 fixes
-  /// agree, and the robot has been farther than 2 s from where the window begins (a distance, not a length of path: the
+  /// alignment's, not that fix's. Nothing until the yaw's standard deviation is below the limit and at least 4 fixes
+  /// agree. Either at least 4 velocities agree and tell the yaw as well as that by themselves, or the robot has been
+  /// farther than 2 standard deviations of a fix from where the window begins (a distance, not a length of path: the
   /// jitter of a parked robot's odometry adds up to a long path).
   std::optional<PoseEstimate> estimate() const;
 
@@ -69,7 +84,7 @@ class HeadingInitializer {
   /// The fixes since start or reset span `initialization_timeout`.
   bool timed_out() const;
 
-  /// Forgets every fix, and starts the time-out anew.
+  /// Forgets every fix and velocity, and starts the time-out anew.
   void reset();
 
   /// What is missing, for people, e.g. "heading: moved 2.1 of 10.0 m"; empty where there is an estimate.
@@ -79,32 +94,39 @@ class HeadingInitializer {
   struct Sample {
     Pose2 odometry;
     LocalFix fix;
-    double information;  ///< 1 / m^2, 1 / mean variance of the fix per axis
   };
   struct Alignment {
     Eigen::Vector2d odometry_centroid;
     Eigen::Vector2d map_centroid;
-    double yaw;                ///< rad, of the odometry's frame in the map frame
-    double information;        ///< 1 / m^2, sum of the weights
-    double lever_information;  ///< sum of the weights times squared lever arms (dimensionless)
+    double yaw;                   ///< rad, of the odometry's frame in the map frame
+    double speed_factor;          ///< of the receiver's velocities along the odometry's, over the odometry's
+    double information;           ///< 1 / m^2, sum of the fixes' weights
+    double lever_information;     ///< 1 / rad^2, sum of the fixes' weights times squared lever arms
+    double velocity_information;  ///< 1 / rad^2, sum of the velocities' weights times squared speeds
   };
   /// An alignment over the samples that agree.
   struct Consensus {
     Alignment alignment;
-    std::size_t count;         ///< samples that agree
-    std::size_t latest;        ///< index of the last of these
-    double noise_sigma;        ///< m, the s above
-    double position_variance;  ///< m^2, per axis, of the centroid
-    double yaw_variance;       ///< rad^2
+    std::size_t latest;            ///< index of the last fix that agrees
+    double noise_sigma;            ///< m, of a fix per axis
+    double position_variance;      ///< m^2, per axis, of the centroid
+    double yaw_variance;           ///< rad^2
+    double velocity_yaw_variance;  ///< rad^2, of the velocities alone
   };
-  Alignment align(const std::vector<double>& weights) const;
-  std::vector<double> normalised_residuals(const Alignment& alignment) const;
+  Alignment align(const std::vector<double>& fix_weights, const std::vector<double>& velocity_weights) const;
+  /// Lengths of what an alignment leaves, m and m/s.
+  std::vector<double> fix_residuals(const Alignment& alignment) const;
+  std::vector<double> velocity_residuals(const Alignment& alignment) const;
   std::optional<Consensus> consensus() const;
+  /// By which the mean of the velocities' correlated errors varies more than that of independent ones.
+  double velocity_inflation() const;
   double distance_moved() const;
+  bool is_known_by_velocities(const Consensus& found) const;
   bool is_converged(const Consensus& found) const;
 
   HeadingInitializerParameters parameters_;
   std::deque<Sample> samples_;
+  std::deque<VelocityPair> velocities_;
   std::optional<Stamp> first_stamp_;
 };
 

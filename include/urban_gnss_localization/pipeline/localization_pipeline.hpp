@@ -12,6 +12,7 @@
 #include "urban_gnss_localization/gnss/fix_sanitation.hpp"
 #include "urban_gnss_localization/gnss/heading_initializer.hpp"
 #include "urban_gnss_localization/motion/odometry_history.hpp"
+#include "urban_gnss_localization/motion/yaw_rate_check.hpp"
 #include "urban_gnss_localization/pipeline/stamp_monitor.hpp"
 
 namespace urban_gnss {
@@ -21,12 +22,11 @@ struct LocalizationParameters {
   double initial_position_sigma{1.0};            ///< m, of initial_pose
   double initial_heading_sigma{0.2};             ///< rad, of initial_pose
   std::vector<double> antenna_offset{0.0, 0.0};  ///< m, x and y of the antenna in the base frame
-  bool use_imu_yaw_rate{false};                  ///< the IMU's yaw rate in place of the odometry's, where there is one
-  bool use_gps_velocity{true};    ///< the receiver's velocity, by localizers that know what to do with it
-  /// m/s per axis, where a receiver declares no covariance of its velocity
-  double velocity_sigma_default{0.3};
-  double velocity_sigma_floor{0.05};  ///< m/s per axis, least that is believed
-  double odometry_gap{2.0};                      ///< s without odometry after which the robot's place is unknown
+  bool use_imu_yaw_rate{true};                   ///< the IMU's yaw rate in place of the odometry's, where there is one
+  bool use_gps_velocity{true};                   ///< the receiver's velocity, where the localizer makes use of it
+  double velocity_sigma_default{0.3};  ///< m/s per axis, where a receiver declares no covariance of its velocity
+  double velocity_sigma_floor{0.05};   ///< m/s per axis, added to the declared covariance
+  double odometry_gap{2.0};            ///< s without odometry after which the robot's place is unknown
   /// m, beyond three declared standard deviations: a fix farther from the estimate cannot be explained by reflections
   /// (Nishida et al., Japanese text: the distance does not vary by more than some tens of metres)
   double max_bias_radius{50.0};
@@ -96,6 +96,7 @@ struct LocalizationReport {
   FixVerdict last_fix;
   std::uint64_t fixes_used{0};
   std::uint64_t fixes_rejected{0};
+  std::uint64_t velocities_used{0};  ///< of the receiver
   double fix_age_s{std::numeric_limits<double>::quiet_NaN()};
   double odometry_age_s{0.0};
   double position_sigma_m{std::numeric_limits<double>::quiet_NaN()};
@@ -123,9 +124,19 @@ class LocalizationPipeline {
   LocalizationPipeline(const LocalizationParameters& parameters, std::unique_ptr<Localizer> localizer);
 
   void add_odometry(const OdometrySample& sample);
+  /// Where use_imu_yaw_rate is set, a step of odometry has the mean of the IMU's yaw rates within it, or the last one
+  /// from up to 0.2 s before it, and where there is none the odometry's own.
+  ///
+  /// A localizer that estimates the yaw rate's bias has one bias for both sources. That of the IMU holds on while the
+  /// odometry steps in, which is wrong by the difference of their biases: some hundredths of a radian in 10 s, little
+  /// beside the uncertainty that grows in that time, but not to be kept up for minutes. So a source that changes for
+  /// longer than odometry_gap is an event.
   void add_imu_yaw_rate(Stamp stamp, double yaw_rate_radps);
   void add_fix(const RawFix& fix);
-  /// A velocity of the receiver. One that cannot be used is left out, with an event that says why.
+  /// Whether velocities of the receiver change anything: where they are wanted, and the localizer makes use of them.
+  bool takes_velocity() const { return parameters_.use_gps_velocity && localizer_->takes_velocity(); }
+  /// A velocity of the receiver. It waits for the odometry of its stamp, tells the heading from which to start, and is
+  /// taken by the localizer. One that cannot be used is left out, with an event that says why.
   void add_velocity(const RawVelocity& velocity);
   /// The bias at a fix, where the localizer wants one.
   void add_bias(const BiasEstimate& bias);
@@ -174,8 +185,8 @@ class LocalizationPipeline {
   void initialize_with(const PendingFix& pending);
   void remember_for_start(const PendingFix& pending);
   bool try_start(const PendingFix& pending);
-  /// A robot that was parked at its start has its heading as soon as it has moved: whatever the filter made of a heading
-  /// that nobody knew is given up for it.
+  /// A robot that was parked at its start has its heading as soon as it has moved: whatever the filter made of a
+  /// heading that nobody knew is given up for it.
   bool start_with_heading(const PendingFix& pending);
   bool restart_if_lost(const PendingFix& pending);
   void start(const PoseEstimate& pose, const std::string& how);
@@ -185,6 +196,7 @@ class LocalizationPipeline {
   void decide_unexamined(const PendingFix& pending, const char* reason);
   void guard_against_non_finite();
   Twist2 with_imu(const OdometrySample& sample, Stamp since);
+  void watch_imu(const OdometrySample& sample, std::optional<double> imu_yaw_rate_radps, double duration_s);
   /// Whether the stamp is newer than the stream's last, or the stream's clock was set back, which resets everything.
   bool is_new(StampMonitor& monitor, Stamp stamp, const char* stream);
   Eigen::Vector2d antenna_offset() const;
@@ -208,6 +220,9 @@ class LocalizationPipeline {
   StampMonitor velocity_stamps_;
   std::optional<OdometrySample> last_odometry_;
   std::deque<std::pair<Stamp, double>> imu_yaw_rates_;
+  std::optional<YawRateCheck> yaw_rate_check_;  ///< until it has found something
+  double without_imu_s_{0.0};                   ///< of odometry, since the IMU's last yaw rate
+  bool imu_is_silent_{true};                    ///< for longer than odometry_gap, or there never was one
 
   std::deque<RawFix> before_datum_;
   std::deque<PendingFix> pending_;
@@ -219,12 +234,13 @@ class LocalizationPipeline {
 
   bool initialized_{false};
   bool lost_{false};
-  bool heading_unknown_{false};  ///< the last start had none
+  bool heading_unknown_{false};     ///< the last start had none
   std::optional<Stamp> far_since_;  ///< since when every fix has been farther than max_bias_radius
   std::optional<Stamp> last_used_;
   FixVerdict last_verdict_;
   std::uint64_t fixes_used_{0};
   std::uint64_t fixes_rejected_{0};
+  std::uint64_t velocities_used_{0};
 
   std::vector<LocalizationOutput> outputs_;
   std::vector<FixVerdict> verdicts_;

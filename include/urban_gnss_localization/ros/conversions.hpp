@@ -3,6 +3,7 @@
 #include <geometry_msgs/PoseArray.h>
 #include <geometry_msgs/PoseWithCovariance.h>
 #include <geometry_msgs/TransformStamped.h>
+#include <geometry_msgs/TwistStamped.h>
 #include <geometry_msgs/TwistWithCovarianceStamped.h>
 #include <nav_msgs/Odometry.h>
 #include <ros/time.h>
@@ -45,8 +46,25 @@ Stamp to_stamp(const ros::Time& time);
 ros::Time to_ros(Stamp stamp);
 
 RawFix to_raw_fix(const sensor_msgs::NavSatFix& message);
-/// East and north of a receiver's velocity, whatever the frame's name is.
+/// East and north of a receiver's velocity, whatever the frame's name is: drivers write that of the antenna there.
 RawVelocity to_raw_velocity(const geometry_msgs::TwistWithCovarianceStamped& message);
+/// The same without a covariance.
+RawVelocity to_raw_velocity(const geometry_msgs::TwistStamped& message);
+/// Either of them, in a message whose type is known when it comes: `Any` is topic_tools::ShapeShifter or
+/// rosbag::MessageInstance. Nothing where it is of another type.
+template <class Any>
+std::optional<RawVelocity> to_raw_velocity_of(const Any& message) {
+  using geometry_msgs::TwistStamped;
+  using geometry_msgs::TwistWithCovarianceStamped;
+  if (message.getDataType() == ros::message_traits::DataType<TwistWithCovarianceStamped>::value()) {
+    return to_raw_velocity(*message.template instantiate<TwistWithCovarianceStamped>());
+  }
+  if (message.getDataType() == ros::message_traits::DataType<TwistStamped>::value()) {
+    return to_raw_velocity(*message.template instantiate<TwistStamped>());
+  }
+  return std::nullopt;
+}
+inline constexpr char kVelocityTypes[] = "geometry_msgs/TwistWithCovarianceStamped or geometry_msgs/TwistStamped";
 /// A fix without covariance.
 sensor_msgs::NavSatFix to_message(const GeodeticPosition& place, const ros::Time& time, const std::string& frame);
 GeodeticPosition to_geodetic(const sensor_msgs::NavSatFix& message);

@@ -10,6 +10,7 @@
 #include <tf2_ros/buffer.h>
 #include <tf2_ros/transform_broadcaster.h>
 #include <tf2_ros/transform_listener.h>
+#include <topic_tools/shape_shifter.h>
 #include <urban_gnss_localization/FromLL.h>
 #include <urban_gnss_localization/GpsBias.h>
 #include <urban_gnss_localization/SetDatum.h>
@@ -51,9 +52,9 @@ struct LocalizerNodeParameters {
 /// The shell of every localizer: topics, services, tf, status and diagnostics around a LocalizationPipeline. A
 /// localizer node makes its filter, hands it over and, where it has more to show, publishes that in `on_output`.
 ///
-/// Subscribes odom, gps/fix, initialpose, gps/datum; gps/bias where the filter wants it; imu/data where
-/// use_imu_yaw_rate is set. Publishes odometry/filtered, tf map -> odom, ~status, and gps/datum (latched) where it
-/// found the datum itself. Services set_pose, datum, toLL, fromLL, ~reset.
+/// Subscribes odom, gps/fix, initialpose, gps/datum; gps/bias and gps/velocity where the filter wants them; imu/data
+/// where use_imu_yaw_rate is set. Publishes odometry/filtered, tf map -> odom, ~status, and gps/datum (latched) where
+/// it found the datum itself. Services set_pose, datum, toLL, fromLL, ~reset.
 class LocalizerNode {
  public:
   using OutputHook = std::function<void(const LocalizationOutput&)>;
@@ -66,6 +67,7 @@ class LocalizerNode {
  private:
   void on_odometry(const nav_msgs::Odometry& message);
   void on_fix(const sensor_msgs::NavSatFix& message);
+  void on_velocity(const topic_tools::ShapeShifter& message);
   void on_imu(const sensor_msgs::Imu& message);
   void on_bias(const urban_gnss_localization::GpsBias& message);
   void on_initial_pose(const geometry_msgs::PoseWithCovarianceStamped& message);

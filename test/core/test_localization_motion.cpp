@@ -1,0 +1,208 @@
+// What the pipeline makes of the receiver's velocity and the IMU's yaw rate.
+
+#include "pipeline_rig.hpp"
+#include "urban_gnss_localization/filters/imm_ekf.hpp"
+
+namespace urban_gnss {
+namespace {
+
+using Level = PipelineEvent::Level;
+
+/// With the true heading, the odometry's velocity of the antenna is the measured one.
+void expect_explained(const VelocityMeasurement& measurement, const Pose2& base_now) {
+  const Eigen::Vector2d predicted = transform_point({0.0, 0.0, base_now.yaw}, measurement.antenna_velocity_in_body);
+  EXPECT_LT((predicted - measurement.velocity).norm(), 1e-9);
+}
+
+TEST(LocalizationMotion, VelocityWaitsForTheOdometryOfItsStamp) {
+  Rig rig(kGiven);
+  rig.drive(0.0);
+  rig.drive(0.9);
+  rig.pipeline.add_velocity(Rig::velocity(1.0));
+  rig.drive(0.95);
+  EXPECT_TRUE(rig.fake->velocities.empty());
+  rig.drive(1.1);
+  ASSERT_EQ(rig.fake->velocities.size(), 1u);
+  expect_explained(rig.fake->velocities[0], Rig::truth(1.1));
+  EXPECT_EQ(rig.pipeline.report().velocities_used, 1u);
+}
+
+TEST(LocalizationMotion, LateVelocityIsComparedWithTheHeadingAtItsOwnStampF23) {
+  Rig rig(kGiven);
+  rig.pipeline.set_antenna_offset({0.7, -0.4});
+  for (int k = 0; k <= 40; ++k) rig.drive(0.1 * k);
+  for (const double time : {0.0, 1.0, 2.137, 3.95, 4.0}) {
+    rig.pipeline.add_velocity(Rig::velocity(time, {0.7, -0.4}));
+    expect_explained(rig.fake->velocities.back(), Rig::truth(4.0));
+  }
+  EXPECT_EQ(rig.fake->velocities.size(), 5u);
+}
+
+TEST(LocalizationMotion, CovarianceIsTheDeclaredOrTheDefault) {
+  Rig rig(
+      "{datum: [33.0, 130.0, 20.0], initial_pose: [0.0, 0.0, 0.0], velocity_sigma_floor: 0.3, "
+      "velocity_sigma_default: 0.7}");
+  rig.run(0.0, 1.0, false);
+  RawVelocity velocity = Rig::velocity(0.1);
+  velocity.covariance = isotropic(0.4);
+  rig.pipeline.add_velocity(velocity);
+  EXPECT_LT((rig.fake->velocities.back().covariance - isotropic(0.5)).norm(), 1e-12);
+  int k = 1;
+  for (const double bad : {0.0, -1.0, kNaN, kInfinity}) {
+    velocity.stamp = Rig::at(0.1 * ++k);
+    velocity.covariance = bad * Eigen::Matrix2d::Identity();
+    rig.pipeline.add_velocity(velocity);
+    EXPECT_LT((rig.fake->velocities.back().covariance - isotropic(0.7)).norm(), 1e-12) << bad;
+  }
+}
+
+TEST(LocalizationMotion, VelocityThatCannotBeUsedIsLeftOutWithAnEventF25) {
+  Rig rig(kGiven);
+  rig.run(0.0, 20.0, false);
+  rig.pipeline.add_velocity(Rig::velocity(19.0));
+  rig.pipeline.take_events();
+  for (const double bad : {kNaN, kInfinity, -kInfinity, 1e300, 200.0}) {
+    for (int axis = 0; axis < 2; ++axis) {
+      RawVelocity velocity = Rig::velocity(19.5);
+      velocity.velocity[axis] = bad;
+      rig.pipeline.add_velocity(velocity);
+      EXPECT_TRUE(has_event(rig.pipeline, Level::kWarn, "velocity of the receiver left out: not finite")) << bad;
+    }
+  }
+  rig.pipeline.add_velocity(Rig::velocity(30.5));
+  EXPECT_TRUE(has_event(rig.pipeline, Level::kWarn, "ahead of the odometry"));
+  rig.pipeline.add_velocity(Rig::velocity(19.0));
+  EXPECT_TRUE(has_event(rig.pipeline, Level::kWarn, "not newer than the last"));
+  rig.pipeline.add_velocity(Rig::velocity(18.5));
+  EXPECT_TRUE(has_event(rig.pipeline, Level::kWarn, "not newer than the last"));
+  EXPECT_EQ(rig.fake->velocities.size(), 1u);
+  rig.pipeline.add_velocity(Rig::velocity(19.5));
+  EXPECT_EQ(rig.fake->velocities.size(), 2u);
+
+  Rig early(kGiven);
+  early.run(12.0, 30.0, false);
+  early.pipeline.take_events();
+  early.pipeline.add_velocity(Rig::velocity(15.0));
+  EXPECT_TRUE(has_event(early.pipeline, Level::kWarn, "older than the odometry"));
+  EXPECT_TRUE(early.fake->velocities.empty());
+}
+
+TEST(LocalizationMotion, VelocitiesAreTheSameAfterAClockThatWasSetBackF21) {
+  Rig rig(kGiven);
+  std::size_t used[2];
+  for (std::size_t& count : used) {
+    for (int k = 0; k <= 100; ++k) {
+      rig.pipeline.add_velocity(Rig::velocity(0.1 * k));
+      rig.drive(0.1 * k);
+    }
+    count = rig.pipeline.report().velocities_used;
+  }
+  EXPECT_TRUE(has_event(rig.pipeline, Level::kWarn, "jumped back"));
+  EXPECT_EQ(used[0], 101u);
+  // The one that showed the jump went before the odometry that begins anew: it is used, too.
+  EXPECT_EQ(used[1], 101u);
+}
+
+TEST(LocalizationMotion, VelocitiesAreForThoseWhoWantThem) {
+  for (const bool use : {true, false}) {
+    for (const bool takes : {true, false}) {
+      Rig rig(std::string("{datum: [33.0, 130.0, 20.0], initial_pose: [0.0, 0.0, 0.0], use_gps_velocity: ") +
+              (use ? "true}" : "false}"));
+      rig.fake->takes = takes;
+      rig.run(0.0, 1.0, false);
+      RawVelocity bad = Rig::velocity(0.3);
+      bad.velocity.x() = kNaN;
+      rig.pipeline.take_events();
+      rig.pipeline.add_velocity(bad);
+      rig.pipeline.add_velocity(Rig::velocity(0.5));
+      EXPECT_EQ(rig.pipeline.takes_velocity(), use && takes);
+      EXPECT_EQ(rig.fake->velocities.size(), use && takes ? 1u : 0u);
+      EXPECT_EQ(rig.pipeline.take_events().empty(), !(use && takes));
+    }
+  }
+}
+
+/// s until it has started from fixes of 5 m.
+double start_time(bool with_velocities, double& yaw_error) {
+  Rig rig("datum: [33.0, 130.0, 20.0]");
+  RandomEngine engine = make_engine(6);
+  for (int k = 0; k <= 600; ++k) {
+    const double time = 0.1 * k;
+    if (k % 10 == 0) {
+      const Eigen::Vector2d error(5.0 * draw_normal(engine), 5.0 * draw_normal(engine));
+      rig.pipeline.add_fix(raw_fix(Rig::at(time), Rig::truth(time).position() + error, 5.0));
+      if (with_velocities) rig.pipeline.add_velocity(Rig::velocity(time));
+    }
+    rig.drive(time);
+    if (!rig.pipeline.initialized()) continue;
+    yaw_error = std::abs(angle_difference(rig.fake->starts[0].pose.yaw, Rig::truth(time).yaw));
+    return time;
+  }
+  return kInfinity;
+}
+
+TEST(LocalizationMotion, VelocitiesTellTheHeadingWithinSeconds) {
+  double with_error = kNaN;
+  double without_error = kNaN;
+  EXPECT_LT(start_time(true, with_error), 5.0);
+  EXPECT_LT(with_error, 0.05);
+  EXPECT_GT(start_time(false, without_error), 10.0);
+}
+
+const char* const kWithImu = "{datum: [33.0, 130.0, 20.0], initial_pose: [0.0, 0.0, 0.0]}";
+
+TEST(LocalizationMotion, SilentImuFallsBackToTheOdometryAndIsSaidOnce) {
+  Rig rig(kWithImu);
+  int warnings = 0;
+  int infos = 0;
+  for (int k = 0; k <= 200; ++k) {
+    if (k < 50 || k > 150) rig.pipeline.add_imu_yaw_rate(Rig::at(0.1 * k), 0.3);
+    rig.drive(0.1 * k);
+    for (const PipelineEvent& event : rig.pipeline.take_events()) {
+      warnings += event.text.find("the IMU is silent") != std::string::npos;
+      infos += event.text.find("the IMU's yaw rate is used") != std::string::npos;
+    }
+  }
+  EXPECT_EQ(warnings, 1);
+  EXPECT_EQ(infos, 2);  // at the start, and when it came back
+  EXPECT_EQ(rig.fake->moves[40].first.yaw_rate_radps, 0.3);
+  EXPECT_EQ(rig.fake->moves[100].first.yaw_rate_radps, Rig::kTwist.yaw_rate_radps);
+  EXPECT_EQ(rig.fake->moves[180].first.yaw_rate_radps, 0.3);
+}
+
+TEST(LocalizationMotion, ImuThatIsSlowerThanTheOdometryIsOneSource) {
+  Rig rig(kWithImu);
+  for (int k = 0; k <= 100; ++k) {
+    if (k % 5 == 0) rig.pipeline.add_imu_yaw_rate(Rig::at(0.02 * k), 0.3);  // 10 Hz beside 50 Hz
+    rig.drive(0.02 * k);
+  }
+  for (const auto& [twist, duration_s] : rig.fake->moves) EXPECT_EQ(twist.yaw_rate_radps, 0.3);
+}
+
+TEST(LocalizationMotion, YawRateFromTheFutureIsLeftOut) {
+  Rig rig(kWithImu);
+  rig.drive(0.0);
+  rig.pipeline.add_imu_yaw_rate(Rig::at(3600.0), 0.3);
+  EXPECT_TRUE(has_event(rig.pipeline, Level::kWarn, "yaw rate of the IMU left out"));
+  rig.pipeline.add_imu_yaw_rate(Rig::at(0.1), 0.2);  // not taken for a clock that was set back
+  rig.drive(0.1);
+  EXPECT_EQ(rig.fake->moves.at(0).first.yaw_rate_radps, 0.2);
+}
+
+TEST(LocalizationMotion, ImuThatContradictsTheOdometryIsSaidOnce) {
+  for (const auto& [factor, warnings] : {std::pair{1.0, 0}, {-1.0, 1}, {57.3, 1}, {0.4, 0}}) {
+    Rig rig(kWithImu);
+    int count = 0;
+    for (int k = 0; k <= 2000; ++k) {
+      rig.pipeline.add_imu_yaw_rate(Rig::at(0.1 * k), factor * Rig::kTwist.yaw_rate_radps);
+      rig.drive(0.1 * k);
+      for (const PipelineEvent& event : rig.pipeline.take_events()) {
+        count += event.text.find("times the odometry's") != std::string::npos;
+      }
+    }
+    EXPECT_EQ(count, warnings) << factor;
+  }
+}
+
+}  // namespace
+}  // namespace urban_gnss

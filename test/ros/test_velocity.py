@@ -1,0 +1,100 @@
+#!/usr/bin/env python3
+"""gps/velocity live: both types of messages reach the localizer and tell it the heading; another type does no harm."""
+import math
+import threading
+import unittest
+
+import rospy
+import rostest
+from geometry_msgs.msg import TwistStamped, TwistWithCovarianceStamped, Vector3Stamped
+from nav_msgs.msg import Odometry
+from std_srvs.srv import Empty
+from urban_gnss_localization.msg import LocalizationStatus
+
+YAW = 0.4      # rad, true, where the localizer starts at 0 +- 0.5
+SPEED = 2.0    # m/s
+ODOMETRY = 200  # messages, at 10 Hz
+EVERY = 10     # messages of odometry, a velocity
+
+
+def velocity(kind, stamp):
+    message = kind()
+    message.header.stamp = stamp
+    message.header.frame_id = "gps"
+    if kind is Vector3Stamped:
+        return message
+    twist = message.twist if kind is TwistStamped else message.twist.twist
+    twist.linear.x, twist.linear.y = SPEED * math.cos(YAW), SPEED * math.sin(YAW)
+    if kind is TwistWithCovarianceStamped:
+        message.twist.covariance[0] = message.twist.covariance[7] = 0.01
+    return message
+
+
+def odometry(stamp, x):
+    message = Odometry()
+    message.header.stamp = stamp
+    message.header.frame_id, message.child_frame_id = "odom", "base_link"
+    message.pose.pose.position.x = x
+    message.pose.pose.orientation.w = 1.0
+    message.twist.twist.linear.x = SPEED
+    return message
+
+
+class VelocityTest(unittest.TestCase):
+    def setUp(self):
+        self.changed = threading.Condition()
+        self.used, self.estimate = None, None
+        rospy.Subscriber("imm_ekf/status", LocalizationStatus, self.on_status)
+        rospy.Subscriber("odometry/filtered", Odometry, self.on_estimate, queue_size=1000)
+        self.odometry = rospy.Publisher("odom", Odometry, queue_size=1000)
+        rospy.wait_for_service("imm_ekf/reset", 10.0)
+
+    def on_status(self, message):
+        with self.changed:
+            self.used = message.velocities_used
+            self.changed.notify_all()
+
+    def on_estimate(self, message):
+        with self.changed:
+            self.estimate = message
+            self.changed.notify_all()
+
+    def wait(self, condition, what):
+        with self.changed:
+            self.assertTrue(self.changed.wait_for(condition, 10.0), what)
+
+    def drive(self, kind, start):
+        """Drives straight on; returns the last estimate and how many velocities were used."""
+        rospy.ServiceProxy("imm_ekf/reset", Empty)()
+        velocities = rospy.Publisher("gps/velocity", kind, queue_size=1000)
+        deadline = rospy.Time.now() + rospy.Duration(10.0)
+        while velocities.get_num_connections() == 0 or self.odometry.get_num_connections() == 0:
+            self.assertLess(rospy.Time.now(), deadline, "no connection")
+            rospy.sleep(0.01)
+        for k in range(ODOMETRY + 1):
+            stamp = rospy.Time.from_sec(start + 0.1 * k)
+            if k % EVERY == 0:
+                velocities.publish(velocity(kind, stamp))
+            self.odometry.publish(odometry(stamp, 0.1 * SPEED * k))
+            # One message at a time: no queue is long enough for a machine that is slow enough.
+            self.wait(lambda: self.estimate is not None and self.estimate.header.stamp >= stamp, "no estimate")
+        self.used = None
+        self.wait(lambda: self.used is not None, "no status")
+        velocities.unregister()
+        orientation = self.estimate.pose.pose.orientation
+        return 2.0 * math.atan2(orientation.z, orientation.w), self.used
+
+    def test_velocities_of_every_type(self):
+        for start, kind in ((1000.0, TwistStamped), (2000.0, TwistWithCovarianceStamped)):
+            yaw, used = self.drive(kind, start)
+            # The last may still be on its way: it comes on a connection of its own.
+            self.assertGreaterEqual(used, ODOMETRY // EVERY, kind)
+            self.assertAlmostEqual(yaw, YAW, delta=0.1, msg=str(kind))
+        yaw, used = self.drive(Vector3Stamped, 3000.0)
+        self.assertEqual(used, 0)
+        self.assertAlmostEqual(yaw, 0.0, delta=0.1)
+
+
+if __name__ == "__main__":
+    rospy.init_node("test_velocity")
+    rostest.rosrun("urban_gnss_localization", "test_velocity", VelocityTest)
