@@ -42,9 +42,9 @@ void BM_Step(benchmark::State& state, ParticleFilterMode mode) {
   ParticleFilterParameters parameters;
   parameters.mode = mode;
   parameters.particle_count = static_cast<int>(state.range(0));
-  parameters.fix.direct_sigma = 0.05;
-  parameters.fix.shadow_sigma = 0.316;
-  parameters.fix.use_fix_covariance = false;
+  parameters.model.fix.direct_sigma = 0.05;
+  parameters.model.fix.shadow_sigma = 0.316;
+  parameters.model.fix.use_fix_covariance = false;
   parameters.cluster_cell = 0.5;
   const auto filter = make_particle_filter(parameters, paper_motion());
   filter->initialize({});

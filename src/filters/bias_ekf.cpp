@@ -16,12 +16,6 @@ constexpr int kYawRateScale = kErrorStates;
 using Sensitivity = Eigen::Matrix<double, 2, kBiasStates>;
 using Gain = Eigen::Matrix<double, kBiasStates, 2>;
 
-BiasEkfState offset_from(const BiasEkfState& centre, const BiasEkfState& state) {
-  BiasEkfState offset = state - centre;
-  offset[kYaw] = wrap_angle(offset[kYaw]);
-  return offset;
-}
-
 void make_symmetric(BiasEkfCovariance& covariance) { covariance = 0.5 * (covariance + covariance.transpose().eval()); }
 
 }  // namespace
@@ -34,19 +28,10 @@ BiasGaussian start_gaussian(const PoseEstimate& start, const SwitchingModelParam
   return first;
 }
 
-BiasGaussian match_moments(const BiasGaussian* parts, const double* weights, std::size_t count) {
-  const BiasEkfState& centre = parts[std::max_element(weights, weights + count) - weights].mean;
-  BiasEkfState mean = BiasEkfState::Zero();
-  for (std::size_t i = 0; i < count; ++i) mean += weights[i] * offset_from(centre, parts[i].mean);
-  BiasGaussian whole;
-  for (std::size_t i = 0; i < count; ++i) {
-    if (weights[i] <= 0.0) continue;
-    const BiasEkfState spread = offset_from(centre, parts[i].mean) - mean;
-    whole.covariance += weights[i] * (parts[i].covariance + spread * spread.transpose());
-  }
-  whole.mean = centre + mean;
-  whole.mean[kYaw] = wrap_angle(whole.mean[kYaw]);
-  return whole;
+BiasEkfState difference(const BiasEkfState& a, const BiasEkfState& b) {
+  BiasEkfState apart = a - b;
+  apart[kYaw] = wrap_angle(apart[kYaw]);
+  return apart;
 }
 
 void predict(BiasGaussian& state, const MotionStep& motion, const OdometryErrorParameters& p) {

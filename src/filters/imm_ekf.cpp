@@ -18,6 +18,12 @@ constexpr BiasMode kModes[kContinuations] = {BiasMode::kDirect, BiasMode::kSlow,
 
 using Gaussian = ImmEkf::Gaussian;
 
+template <std::size_t N>
+Gaussian mixture_of(const std::array<Gaussian, N>& parts, const std::array<double, N>& weights) {
+  return match_moments(
+      N, [&](std::size_t i) -> const Gaussian& { return parts[i]; }, [&](std::size_t i) { return weights[i]; });
+}
+
 }  // namespace
 
 ImmEkf::ImmEkf(const ImmEkfParameters& parameters, const MotionParameters& motion)
@@ -55,7 +61,7 @@ Gaussian ImmEkf::mixed_into(BiasMode to, const ModeTransition& transition, doubl
   }
   if (!(sum > 0.0)) return parts[0];
   for (double& weight : weights) weight /= sum;
-  return match_moments(parts.data(), weights.data(), parts.size());
+  return mixture_of(parts, weights);
 }
 
 FixVerdict ImmEkf::correct(const FixMeasurement& fix) {
@@ -106,9 +112,7 @@ FixVerdict ImmEkf::correct(const FixMeasurement& fix) {
   filters_[index_of(BiasMode::kDirect)] = next[index_of(BiasMode::kDirect)];
   filters_[index_of(BiasMode::kFast)] = next[index_of(BiasMode::kFast)];
   if (slow > 0.0) {
-    const Gaussian parts[] = {next[kSlow], next[kJump]};
-    const double weights[] = {posterior[kSlow] / slow, posterior[kJump] / slow};
-    filters_[kSlow] = match_moments(parts, weights, 2);
+    filters_[kSlow] = mixture_of<2>({next[kSlow], next[kJump]}, {posterior[kSlow] / slow, posterior[kJump] / slow});
   }
   probability_ << posterior[index_of(BiasMode::kDirect)], slow, posterior[index_of(BiasMode::kFast)];
   receiver_.compare_with_odometry(fix, before, mixture());
@@ -139,7 +143,9 @@ void ImmEkf::correct_velocity(const VelocityMeasurement& measured) {
   receiver_.learn_velocity(exceeding);
 }
 
-Gaussian ImmEkf::mixture() const { return match_moments(filters_.data(), probability_.data(), filters_.size()); }
+Gaussian ImmEkf::mixture() const {
+  return mixture_of<kLastingModes>(filters_, {probability_[0], probability_[1], probability_[2]});
+}
 
 Pose2 ImmEkf::pose() const { return mixture().pose(); }
 

@@ -22,14 +22,14 @@ double settled_scale(double sigma, double outlier_share, const FixNoiseModelPara
     double x = sigma * draw_normal(engine);
     if (draw_uniform(engine) < outlier_share) x += 1e6;
     const double y = sigma * draw_normal(engine);
-    model.learn(k, (x * x + y * y) / model.scale() > FixNoiseModel::kMedianNis ? 1.0 : 0.0);
+    model.learn(k, (x * x + y * y) / model.scale() > LearntScale::kMedianNis ? 1.0 : 0.0);
     if (k >= kCount / 2) log_sum += std::log(model.scale());
   }
   return std::exp(log_sum / (kCount / 2));
 }
 
 TEST(FixNoiseModel, MedianIsThatOfTheChiSquaredDistribution) {
-  EXPECT_NEAR(FixNoiseModel::kMedianNis, chi_squared_quantile(0.5, 2), 1e-9);
+  EXPECT_NEAR(LearntScale::kMedianNis, chi_squared_quantile(0.5, 2), 1e-9);
 }
 
 TEST(FixNoiseModel, LearnsTheReceiversFactorWhateverTheOutliers) {

@@ -60,9 +60,30 @@ struct BiasGaussian {
 /// The state at a start: no bias, odometry errors about 0.
 BiasGaussian start_gaussian(const PoseEstimate& start, const SwitchingModelParameters& parameters);
 
-/// Mean and covariance of a mixture of `count` >= 1 Gaussians whose weights sum to 1. Yaws are averaged as differences
-/// from the heaviest.
-BiasGaussian match_moments(const BiasGaussian* parts, const double* weights, std::size_t count);
+/// The difference of two states, the yaw's on the circle.
+BiasEkfState difference(const BiasEkfState& a, const BiasEkfState& b);
+
+/// Mean and covariance of a mixture of `count` >= 1 Gaussians: state_of(i) with weight_of(i), which sum to 1. Yaws are
+/// averaged as differences from the heaviest.
+template <class StateOf, class WeightOf>
+BiasGaussian match_moments(std::size_t count, const StateOf& state_of, const WeightOf& weight_of) {
+  std::size_t heaviest = 0;
+  for (std::size_t i = 1; i < count; ++i) {
+    if (weight_of(i) > weight_of(heaviest)) heaviest = i;
+  }
+  const BiasEkfState centre = state_of(heaviest).mean;
+  BiasEkfState mean = BiasEkfState::Zero();
+  for (std::size_t i = 0; i < count; ++i) mean += weight_of(i) * difference(state_of(i).mean, centre);
+  BiasGaussian whole;
+  for (std::size_t i = 0; i < count; ++i) {
+    if (weight_of(i) <= 0.0) continue;
+    const BiasEkfState spread = difference(state_of(i).mean, centre) - mean;
+    whole.covariance += weight_of(i) * (state_of(i).covariance + spread * spread.transpose());
+  }
+  whole.mean = centre + mean;
+  whole.mean[2] = wrap_angle(whole.mean[2]);
+  return whole;
+}
 
 /// Dead-reckons one step.
 void predict(BiasGaussian& state, const MotionStep& step, const OdometryErrorParameters& parameters);
