@@ -9,6 +9,10 @@ namespace {
 
 constexpr int kYaw = 2;
 
+bool has_same_heading(const BiasGaussian& a, const BiasGaussian& b) {
+  return std::abs(angle_difference(a.mean[kYaw], b.mean[kYaw])) < MixtureReducer::kSameHeading;
+}
+
 }  // namespace
 
 double marginal_distance(const BiasGaussian& a, const BiasGaussian& b) {
@@ -51,19 +55,15 @@ void MixtureReducer::sort(const std::vector<BiasHypothesis>& hypotheses) {
   });
 }
 
-void MixtureReducer::reduce(std::vector<BiasHypothesis>& hypotheses, std::size_t most, RandomEngine& engine) {
-  merge(hypotheses);
-  select(hypotheses, most, engine);
-}
-
-void MixtureReducer::merge(std::vector<BiasHypothesis>& hypotheses) {
+void MixtureReducer::merge(std::vector<BiasHypothesis>& hypotheses, double distance) {
   sort(hypotheses);
   kept_.clear();
   for (const std::uint32_t i : order_) {
     BiasHypothesis& other = hypotheses[i];
     if (!(other.weight > 0.0)) break;
     const auto same = std::find_if(kept_.begin(), kept_.end(), [&](std::uint32_t k) {
-      return hypotheses[k].mode == other.mode && marginal_distance(hypotheses[k].state, other.state) < kSame;
+      return hypotheses[k].mode == other.mode && has_same_heading(hypotheses[k].state, other.state) &&
+             marginal_distance(hypotheses[k].state, other.state) < distance;
     });
     if (same == kept_.end()) {
       kept_.push_back(i);

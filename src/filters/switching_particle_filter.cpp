@@ -16,8 +16,6 @@ constexpr int kYaw = 2;
 constexpr double kReportedQuantile = 0.99;
 /// Standard deviations within which particles belong to the cluster of a heavier one.
 constexpr double kClusterSigmas = 3.0;
-/// rad: up to this an extended Kalman filter takes any heading at the start for known.
-constexpr double kKnownHeading = 0.2;
 constexpr BiasMode kModes[kContinuations] = {BiasMode::kDirect, BiasMode::kSlow, BiasMode::kFast, BiasMode::kJump};
 
 /// Cuts a start whose heading is too uncertain for a linearisation into up to `most` slices of headings, all over the
@@ -26,7 +24,7 @@ void slice_heading(const BiasGaussian& start, std::size_t most, std::vector<Bias
   slices.clear();
   const double variance = start.covariance(kYaw, kYaw);
   const double sigma = std::sqrt(variance);
-  const std::size_t count = sigma > kKnownHeading ? most : 1;
+  const std::size_t count = sigma > MixtureReducer::kSameHeading ? most : 1;
   if (count == 1) {
     slices.push_back({start, BiasMode::kDirect, 1.0});
     return;
@@ -94,22 +92,23 @@ bool SwitchingParticleFilter::continue_all(const FixMeasurement& fix, Opinion& o
   const FixNoise noise = receiver_.fix_noise(fix.time_s);
   const ModeTransition transition = mode_transition(elapsed_s, parameters_.model.modes, bias_odds_);
   next_.clear();
-  updates_.clear();
-  double largest = -std::numeric_limits<double>::infinity();
   for (const BiasHypothesis& before : hypotheses_) {
     for (const BiasMode to : kModes) {
-      next_.push_back({before.state, lasting(to), 0.0});
+      next_.push_back({before.state, to, 0.0});
       BiasHypothesis& next = next_.back();
       continue_bias(next.state, before.mode, to, elapsed_s, parameters_.model.modes);
-      updates_.push_back(take_fix(next.state, to, fix, noise, parameters_.model));
-      const double prior =
-          before.weight * transition(static_cast<int>(index_of(before.mode)), static_cast<int>(index_of(to)));
-      next.weight = std::log(prior) + updates_.back().log_likelihood;
-      if (!next.state.is_finite() || std::isnan(next.weight)) {
-        next.weight = -std::numeric_limits<double>::infinity();
-      }
-      largest = std::max(largest, next.weight);
+      next.weight = before.weight * transition(static_cast<int>(index_of(before.mode)), static_cast<int>(index_of(to)));
     }
+  }
+  reducer_.merge(next_, parameters_.merge_distance);
+  updates_.clear();
+  double largest = -std::numeric_limits<double>::infinity();
+  for (BiasHypothesis& next : next_) {
+    updates_.push_back(take_fix(next.state, next.mode, fix, noise, parameters_.model));
+    next.mode = lasting(next.mode);
+    next.weight = std::log(next.weight) + updates_.back().log_likelihood;
+    if (!next.state.is_finite() || std::isnan(next.weight)) next.weight = -std::numeric_limits<double>::infinity();
+    largest = std::max(largest, next.weight);
   }
   if (!std::isfinite(largest)) return false;
   double sum = 0.0;
@@ -142,7 +141,7 @@ FixVerdict SwitchingParticleFilter::correct(const FixMeasurement& fix) {
     verdict.reason = "no particle can take the fix";
     return verdict;
   }
-  reducer_.reduce(next_, most_, engine_);
+  reducer_.select(next_, most_, engine_);
   hypotheses_.swap(next_);
   receiver_.learn_fix(fix.time_s, opinion.exceeding);
   receiver_.compare_with_odometry(fix, before, mixture());
@@ -189,7 +188,7 @@ void SwitchingParticleFilter::draw_cloud() {
 }
 
 void SwitchingParticleFilter::find_clusters() {
-  // reduce() leaves the heaviest first.
+  // The heaviest are first, but for what a velocity has changed.
   const std::size_t count = hypotheses_.size();
   constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
   cluster_.assign(count, kNone);

@@ -73,12 +73,14 @@ TEST(MixtureReduction, ThresholdLeavesAsManyAsAskedFor) {
 TEST(MixtureReduction, MergesWhatIsNearlyTheSameWithItsMoments) {
   std::vector<BiasHypothesis> all = {hypothesis(0.0, 0.3), hypothesis(0.2, 0.25), hypothesis(0.1, 0.05),
                                      hypothesis(3.0, 0.2), hypothesis(0.0, 0.2, 1.0, BiasMode::kDirect)};
+  all.push_back(all[0]);
+  all.back().state.mean[2] = 0.3;  // another heading, however uncertain
+  all[0].weight -= all.back().weight = 0.1;
   const BiasGaussian before = together(all);
-  MixtureReducer reducer(5);
-  RandomEngine engine = make_engine(1);
-  reducer.reduce(all, 5, engine);
-  ASSERT_EQ(all.size(), 3u);  // the far one and that of another mode stay
-  EXPECT_NEAR(all[0].weight, 0.6, 1e-12);
+  MixtureReducer reducer(6);
+  reducer.merge(all, 0.5);
+  ASSERT_EQ(all.size(), 4u);  // the far ones and that of another mode stay
+  EXPECT_NEAR(all[0].weight, 0.5, 1e-12);
   EXPECT_TRUE(together(all).mean.isApprox(before.mean, 1e-12));
   EXPECT_TRUE(together(all).covariance.isApprox(before.covariance, 1e-12));
 }
@@ -96,7 +98,7 @@ TEST(MixtureReduction, SelectionIsUnbiased) {
   constexpr int kTrials = 4000;
   for (int trial = 0; trial < kTrials; ++trial) {
     std::vector<BiasHypothesis> some = all;
-    reducer.reduce(some, 8, engine);
+    reducer.select(some, 8, engine);
     ASSERT_LE(some.size(), 9u);
     ASSERT_GE(some.size(), 7u);
     ASSERT_NEAR(weight_of(some), 1.0, 1e-12);
@@ -115,7 +117,7 @@ TEST(MixtureReduction, FewAreLeftWhereFewArePlausible) {
   for (int k = 1; k < 100; ++k) all.push_back(hypothesis(100.0 * k, 1e-7));
   MixtureReducer reducer(100);
   RandomEngine engine = make_engine(3);
-  reducer.reduce(all, 100, engine);
+  reducer.select(all, 100, engine);
   EXPECT_LE(all.size(), 2u);
   EXPECT_NEAR(weight_of(all), 1.0, 1e-12);
 }

@@ -109,7 +109,7 @@ TEST(ParticleFilter, EveryParameterHasAnEffectF36) {
   };
   // Those of the mode switching have a test of their own.
   const std::size_t others = parameter_names(SwitchingModelParameters{}).size() -
-                             parameter_names(FixSigmaParameters{}).size() + 1;  // max_particles
+                             parameter_names(FixSigmaParameters{}).size() + 2;  // max_particles, merge_distance
   EXPECT_EQ(changes.size() + others, parameter_names(ParticleFilterParameters{}).size());
   for (const auto& [change, base] : changes) {
     EXPECT_FALSE(drive(with(small(base), change)) == drive(small(base))) << change;

@@ -49,6 +49,24 @@ TEST(SwitchingParticleFilter, FirstFixIsTheInteractingModels) {
   }
 }
 
+/// Where all particles of a mode are merged, what is left is imm_ekf, the plain reference of one step and of all.
+TEST(SwitchingParticleFilter, MergedParticlesAreTheInteractingModels) {
+  for (const char* changes :
+       {"{}", "{student_dof: 2.0, bias_fade_time: 5.0, fix_scale_rate: 0.05, fix_correlation_time: 2.0}"}) {
+    SwitchingDrive d;
+    d.bias = bias_between(40.0, 80.0, {15.0, -8.0});
+    SwitchingParticleFilter particles(with(switching(changes), "merge_distance: 1.0e+12"), {});
+    ImmEkf imm(switching(changes).model, {});
+    const auto a = drive(particles, d);
+    const auto b = drive(imm, d);
+    for (std::size_t i = 0; i < a.size(); ++i) {
+      // But for modes that are negligible, and left out at random.
+      ASSERT_TRUE(near(a[i].estimate.pose, b[i].estimate.pose, 0.02)) << a[i].time_s;
+      ASSERT_EQ(a[i].verdict.decision, b[i].verdict.decision) << a[i].time_s;
+    }
+  }
+}
+
 TEST(SwitchingParticleFilter, VelocityCorrectsAndWeighsHeadings) {
   SwitchingParticleFilter filter = make();
   filter.initialize(pose_with_sigma({}, 1.0, kPi));
@@ -239,6 +257,7 @@ TEST(SwitchingParticleFilter, FixThatNoParticleExplainsDoesNotAbortF30) {
 TEST(SwitchingParticleFilter, EveryParameterHasAnEffectF36) {
   const std::vector<std::pair<std::string, std::string>> changes = {
       {"max_particles: 3", "{}"},
+      {"merge_distance: 5.0", "{}"},
       {"use_fix_covariance: false", "{}"},
       {"direct_sigma: 1.0", "{}"},
       {"shadow_sigma: 1.0", "{}"},

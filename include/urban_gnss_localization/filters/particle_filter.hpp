@@ -42,6 +42,7 @@ struct ParticleFilterParameters {
   double gate_timeout{5.0};       ///< s of nothing but rejections after which it restarts on the fix
   int seed{1};
   int max_particles{100};          ///< of the mode switching, whose number adapts itself
+  double merge_distance{0.5};      ///< of the mode switching: particles nearer than this become one; large: imm_ekf
   SwitchingModelParameters model;  ///< of the mode switching; its sigma_b, sigma_s are those of all
 
   template <class V>
@@ -60,6 +61,7 @@ struct ParticleFilterParameters {
     v("gate_timeout", gate_timeout, positive());
     v("seed", seed, any_number());
     v("max_particles", max_particles, between(1, 10000));
+    v("merge_distance", merge_distance, non_negative());
     model.visit(v);
   }
   void check(std::vector<std::string>& faults) const;

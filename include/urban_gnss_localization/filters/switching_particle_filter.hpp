@@ -15,10 +15,11 @@ namespace urban_gnss {
 /// heading that it began with where that was not known; given these, pose, odometry errors and bias are Gaussian, and
 /// each particle has the extended Kalman filter that imm_ekf has for each mode (filters/bias_ekf.hpp).
 ///
-/// At a fix every particle goes on in every mode, with the transition probabilities of the time since the last fix and
-/// the fix's likelihood. What imm_ekf then mixes to three Gaussians is here reduced to max_particles, by
-/// MixtureReducer: nothing is lost of hypotheses that differ for long. So the number of particles adapts itself: few
-/// where the modes are clear, many at a start with an unknown heading and where fixes contradict each other.
+/// At a fix every particle goes on in every mode, with the transition probabilities of the time since the last fix.
+/// Those that then are nearly the same are merged; each takes the fix, which weighs it; of the light ones a few survive
+/// (MixtureReducer). imm_ekf is the same with all of a mode merged: with a large merge_distance this is imm_ekf. So the
+/// number of particles adapts itself: few where the modes are clear, many at a start with an unknown heading and where
+/// fixes contradict each other.
 ///
 /// The estimate is that of the heaviest cluster: of particles whose positions are within three standard deviations of
 /// the heaviest of them, F32. Its covariance is that of all particles about it.
