@@ -38,13 +38,11 @@ ParticleSet cloud(std::size_t count) {
 
 void count_particles(benchmark::State& state) { state.SetItemsProcessed(state.iterations() * state.range(0)); }
 
-void BM_Step(benchmark::State& state, ParticleFilterMode mode) {
-  ParticleFilterParameters parameters;
-  parameters.mode = mode;
-  parameters.particle_count = static_cast<int>(state.range(0));
-  parameters.fix.direct_sigma = 0.05;
-  parameters.fix.shadow_sigma = 0.316;
-  parameters.fix.use_fix_covariance = false;
+/// One step of odometry and a fix, in a shadow.
+void run_steps(benchmark::State& state, ParticleFilterParameters parameters) {
+  parameters.model.fix.direct_sigma = 0.05;
+  parameters.model.fix.shadow_sigma = 0.316;
+  parameters.model.fix.use_fix_covariance = false;
   parameters.cluster_cell = 0.5;
   const auto filter = make_particle_filter(parameters, paper_motion());
   filter->initialize({});
@@ -59,12 +57,24 @@ void BM_Step(benchmark::State& state, ParticleFilterMode mode) {
     fix.time_s += kStep_s;
     benchmark::DoNotOptimize(filter->correct(fix));
   }
-  count_particles(state);
+  state.counters["particles"] = static_cast<double>(filter->particles().size());
 }
-void BM_PaperStep(benchmark::State& state) { BM_Step(state, ParticleFilterMode::kPaper); }
+
+void BM_PaperStep(benchmark::State& state) {
+  ParticleFilterParameters parameters;
+  parameters.particle_count = static_cast<int>(state.range(0));
+  run_steps(state, parameters);
+}
 BENCHMARK(BM_PaperStep)->Arg(1000)->Arg(10000)->Unit(benchmark::kMicrosecond);
-void BM_SwitchingStep(benchmark::State& state) { BM_Step(state, ParticleFilterMode::kSwitching); }
-BENCHMARK(BM_SwitchingStep)->Arg(1000)->Arg(10000)->Unit(benchmark::kMicrosecond);
+
+/// As many particles as are plausible, or (0) all that there may be, as none are merged.
+void BM_SwitchingStep(benchmark::State& state) {
+  ParticleFilterParameters parameters;
+  parameters.mode = ParticleFilterMode::kSwitching;
+  if (state.range(0) == 0) parameters.merge_distance = 0.0;
+  run_steps(state, parameters);
+}
+BENCHMARK(BM_SwitchingStep)->Arg(1)->Arg(0)->Unit(benchmark::kMicrosecond);
 
 void BM_SampleMotion(benchmark::State& state) {
   ParticleSet particles = cloud(static_cast<std::size_t>(state.range(0)));

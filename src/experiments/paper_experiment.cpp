@@ -49,12 +49,7 @@ class Estimator {
       return;
     }
     if (kind_ == PaperMethod::Kind::kImm) {
-      ImmEkfParameters parameters;
-      parameters.fix = conditions.filter.fix;
-      parameters.noise = conditions.filter.noise;
-      parameters.modes = conditions.filter.modes;
-      parameters.odometry = conditions.filter.odometry;
-      filter_ = std::make_unique<ImmEkf>(parameters, conditions.filter_motion);
+      filter_ = std::make_unique<ImmEkf>(conditions.filter.model, conditions.filter_motion);
     } else {
       auto filter = make_particle_filter(conditions.filter, conditions.filter_motion);
       particle_filter_ = filter.get();
@@ -107,7 +102,7 @@ class Estimator {
 void make_oracle(PaperExperimentConditions& c) {
   c.filter.mode = ParticleFilterMode::kConventional;
   c.filter.likelihood = LikelihoodChoice::kProduct;
-  c.filter.fix.use_fix_covariance = true;
+  c.filter.model.fix.use_fix_covariance = true;
 }
 
 }  // namespace

@@ -57,10 +57,11 @@ bool ParticleFilterParameters::uses_gps_heading() const {
 }
 
 ParticleFilter::ParticleFilter(const ParticleFilterParameters& parameters, const MotionParameters& motion)
-    : ParticleLocalizer(static_cast<std::size_t>(parameters.particle_count), parameters.cluster_cell),
+    : ParticleLocalizer(static_cast<std::size_t>(parameters.particle_count)),
       parameters_(parameters),
       motion_(motion),
       nis_threshold_(chi_squared_quantile(std::min(parameters.gate_probability, 1.0 - 1e-12), kFixDof)),
+      clusters_(particles_.size(), parameters.cluster_cell),
       ring_(particles_.size(), parameters.mode == ParticleFilterMode::kConventional ? 0.0 : parameters.ring_share),
       resampler_(particles_.size(), parameters.resampling) {
   initialize({});
@@ -92,8 +93,8 @@ FixVerdict ParticleFilter::correct(const FixMeasurement& fix) {
   had_fix_ = true;
 
   // Sample: the motion has been drawn by move(); what is left of (22) is the ring.
-  ring_.sample(particles_, estimate_, fix.bias_radius_m, parameters_.fix.direct_sigma, parameters_.fix.shadow_sigma,
-               engine_);
+  ring_.sample(particles_, estimate_, fix.bias_radius_m, parameters_.model.fix.direct_sigma,
+               parameters_.model.fix.shadow_sigma, engine_);
 
   // Weigh.
   weigh(particles_, likelihood_of(fix));
@@ -155,8 +156,8 @@ FixLikelihood ParticleFilter::likelihood_of(const FixMeasurement& fix) const {
   likelihood.with_heading = parameters_.uses_gps_heading();
   likelihood.fix = fix.position;
   likelihood.antenna_in_body = fix.antenna_in_body;
-  likelihood.direct_covariance = parameters_.fix.direct_covariance(fix.covariance);
-  likelihood.shadow_sigma = parameters_.fix.shadow_sigma;
+  likelihood.direct_covariance = parameters_.model.fix.direct_covariance(fix.covariance);
+  likelihood.shadow_sigma = parameters_.model.fix.shadow_sigma;
   likelihood.heading_sigma = parameters_.gps_heading_sigma;
   likelihood.radius = fix.bias_radius_m;
   likelihood.fix_heading = fix_heading(fix.position, last_fix_position_, turn_since_fix_);
@@ -167,6 +168,18 @@ Pose2 ParticleFilter::posterior_mean() {
   clusters_.find(particles_);
   if (parameters_.estimate == EstimateMethod::kHeaviestCluster) return clusters_.heaviest_mean(particles_);
   return parameters_.mode == ParticleFilterMode::kLiteral ? arithmetic_mean(particles_) : circular_mean(particles_);
+}
+
+LocalizerHealth ParticleFilter::health() const {
+  LocalizerHealth health;
+  health.heading_sigma_rad = circular_sigma(particles_);
+  health.particle_count = static_cast<std::uint32_t>(particles_.size());
+  health.effective_sample_size = effective_sample_size_;
+  health.position_spread_m =
+      std::sqrt(covariance_about(particles_, circular_mean(particles_)).topLeftCorner<2, 2>().trace());
+  health.cluster_mass = clusters_.heaviest_mass();
+  health.cluster_count = clusters_.count();
+  return health;
 }
 
 }  // namespace urban_gnss

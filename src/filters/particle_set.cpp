@@ -11,6 +11,10 @@ ParticleSet::ParticleSet(std::size_t count) : x(count), y(count), yaw(count), lo
   set_equal_weights();
 }
 
+void ParticleSet::resize(std::size_t count) {
+  for (std::vector<double>* values : {&x, &y, &yaw, &log_weight, &weight}) values->resize(count);
+}
+
 void ParticleSet::draw_gaussian(const PoseEstimate& start, RandomEngine& engine) {
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> decomposition(start.covariance);
   const Eigen::Matrix3d root =

@@ -3,94 +3,67 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
-#include "urban_gnss_localization/filters/dead_reckoning.hpp"
 #include "urban_gnss_localization/gnss/chi_squared.hpp"
 
 namespace urban_gnss {
 namespace {
 
 constexpr int kFixDof = 2;
+constexpr int kYaw = 2;
 constexpr double kReportedQuantile = 0.99;
-constexpr double kResamplingShare = 0.5;
-/// Standard deviation of the resampling's kernel, as a share of the cluster's: its variance grows by 4 %.
-constexpr double kKernel = 0.2;
-constexpr std::size_t kOutlier = kContinuations;
+/// Standard deviations within which particles belong to the cluster of a heavier one.
+constexpr double kClusterSigmas = 3.0;
 constexpr BiasMode kModes[kContinuations] = {BiasMode::kDirect, BiasMode::kSlow, BiasMode::kFast, BiasMode::kJump};
 
-/// The continuation where the cumulated weights exceed `target`; the last one that has any weight where rounding
-/// leaves none.
-template <class Weight>
-std::size_t choose(Weight weight, std::size_t count, double target, double& rest) {
-  std::size_t last = 0;
-  rest = 0.0;
-  for (std::size_t j = 0; j < count; ++j) {
-    const double w = weight(j);
-    if (w > 0.0 && target < w) {
-      rest = target / w;
-      return j;
-    }
-    if (w > 0.0) last = j;
-    target -= w;
+/// Cuts a start whose heading is too uncertain for a linearisation into up to `most` slices of headings, all over the
+/// circle where it is not known at all.
+void slice_heading(const BiasGaussian& start, std::size_t most, std::vector<BiasHypothesis>& slices) {
+  slices.clear();
+  const double variance = start.covariance(kYaw, kYaw);
+  const double sigma = std::sqrt(variance);
+  const std::size_t count = sigma > MixtureReducer::kSameHeading ? most : 1;
+  if (count == 1) {
+    slices.push_back({start, BiasMode::kDirect, 1.0});
+    return;
   }
-  return last;
-}
-
-/// Logarithm of the two-dimensional Student's t density over that at its centre, for a squared distance `nis`.
-double log_student(double nis, double dof) { return -0.5 * (dof + kFixDof) * std::log1p(nis / dof); }
-
-BiasState corrected(const BiasState& predicted, const Eigen::Vector2d& difference, double noise_variance) {
-  const double gain = predicted.variance / (predicted.variance + noise_variance);
-  return {predicted.mean + gain * (difference - predicted.mean), (1.0 - gain) * predicted.variance};
+  const bool is_unknown = variance >= kPi * kPi / 3.0;
+  const double half_range = is_unknown ? kPi : std::min(3.0 * sigma, kPi);
+  const double width = 2.0 * half_range / static_cast<double>(count);
+  const double left = std::min(width * width, variance);  // variance of a slice, which overlaps with those beside it
+  const BiasEkfState with_yaw = start.covariance.col(kYaw) / variance;
+  BiasHypothesis slice{start, BiasMode::kDirect, 0.0};
+  slice.state.covariance -= (variance - left) * with_yaw * with_yaw.transpose();
+  double sum = 0.0;
+  for (std::size_t k = 0; k < count; ++k) {
+    const double offset = (static_cast<double>(k) + 0.5) * width - half_range;
+    slice.state.mean = start.mean + offset * with_yaw;
+    slice.state.mean[kYaw] = wrap_angle(slice.state.mean[kYaw]);
+    sum += slice.weight = is_unknown ? 1.0 : std::exp(-0.5 * offset * offset / variance);
+    slices.push_back(slice);
+  }
+  for (BiasHypothesis& each : slices) each.weight /= sum;
 }
 
 }  // namespace
 
-ParticleContinuation continue_particle(const Pose2& pose, BiasMode mode, const BiasState& bias, const SwitchingFix& fix,
-                                       const ModeTransition& transition, const BiasModeParameters& parameters,
-                                       double draw) {
-  const Eigen::Vector2d difference = fix.position - transform_point(pose, fix.antenna_in_body);
-  const auto row = transition.row(static_cast<int>(index_of(mode)));
-  double weight[kContinuations + 1];
-  double sum = weight[kOutlier] = parameters.outlier_density();
-  for (std::size_t j = 0; j < kContinuations; ++j) {
-    const BiasState predicted = predict_bias(bias, mode, kModes[j], fix.elapsed_s, parameters);
-    const bool is_direct = kModes[j] == BiasMode::kDirect;
-    const double variance = predicted.variance + (is_direct ? fix.direct_variance : fix.shadow_variance);
-    const double nis = (difference - predicted.mean).squaredNorm() / variance;
-    const double log_shape = is_direct ? log_student(nis, parameters.student_dof) : -0.5 * nis;
-    const double density = std::exp(log_shape) / (2.0 * kPi * variance);
-    sum += weight[j] = (1.0 - parameters.outlier_share) * row[static_cast<int>(j)] * density;
-  }
-  ParticleContinuation next;
-  next.log_likelihood = std::log(sum);
-  double rest = 0.0;
-  std::size_t chosen = choose([&](std::size_t j) { return weight[j]; }, kContinuations + 1, draw * sum, rest);
-  next.is_outlier = chosen == kOutlier;
-  if (next.is_outlier) {
-    chosen = choose([&](std::size_t j) { return row[static_cast<int>(j)]; }, kContinuations, rest, rest);
-  }
-  next.mode = lasting(kModes[chosen]);
-  next.bias = predict_bias(bias, mode, kModes[chosen], fix.elapsed_s, parameters);
-  if (!next.is_outlier && next.mode != BiasMode::kDirect) {
-    next.bias = corrected(next.bias, difference, fix.shadow_variance);
-  }
-  return next;
-}
-
 SwitchingParticleFilter::SwitchingParticleFilter(const ParticleFilterParameters& parameters,
                                                  const MotionParameters& motion)
-    : ParticleLocalizer(static_cast<std::size_t>(parameters.particle_count), parameters.cluster_cell),
+    : ParticleLocalizer(static_cast<std::size_t>(parameters.max_particles)),
       parameters_(parameters),
       motion_(motion),
       nis_threshold_(chi_squared_quantile(kReportedQuantile, kFixDof)),
-      resampler_(particles_.size(), ResamplingScheme::kSystematic),
-      biases_(particles_.size()),
-      errors_(particles_.size()),
-      noise_(parameters.noise),
-      modes_before_(particles_.size()),
-      is_outlier_(particles_.size()) {
+      most_(static_cast<std::size_t>(parameters.max_particles)),
+      receiver_(parameters.model),
+      reducer_(kContinuations * most_) {
+  hypotheses_.reserve(kContinuations * most_);
+  next_.reserve(kContinuations * most_);
+  updates_.reserve(kContinuations * most_);
+  cluster_.reserve(most_);
+  cluster_mass_.reserve(most_);
+  draws_.reserve(most_);
   initialize({});
 }
 
@@ -99,232 +72,220 @@ void SwitchingParticleFilter::initialize(const PoseEstimate& start) {
     throw std::invalid_argument("particle_filter: the pose to start from is not finite");
   }
   engine_ = make_engine(static_cast<std::uint64_t>(parameters_.seed));
-  particles_.draw_gaussian(start, engine_);
-  errors_.reset(parameters_.odometry);
-  biases_ = BiasSet(particles_.size());
-  mean_errors_ = {};
-  estimate_ = start.pose;
+  slice_heading(start_gaussian(start, parameters_.model), most_, hypotheses_);
   bias_odds_ = 1.0;
-  noise_.reset();
-  last_fix_s_.reset();
-  moved_s_ = 0.0;
-  clusters_.find(particles_);
-  effective_sample_size_ = urban_gnss::effective_sample_size(particles_);
+  receiver_.reset();
+  draw_cloud();
+  find_clusters();
 }
 
 void SwitchingParticleFilter::move(const Twist2& twist, double duration_s) {
   if (!is_usable(twist, duration_s)) return;
-  moved_s_ += duration_s;
-  noise_.move(twist, duration_s);
-  if (is_parked(twist)) {
-    const double sigma = parameters_.odometry.parked_walk * std::sqrt(duration_s);
-    if (sigma <= 0.0) return;
-    for (std::size_t i = 0; i < particles_.size(); ++i) {
-      particles_.x[i] += sigma * draw_normal(engine_);
-      particles_.y[i] += sigma * draw_normal(engine_);
-    }
-    return;
-  }
-  errors_.walk(duration_s, parameters_.odometry);
-  sample_motion(particles_, errors_, make_motion_step(twist, duration_s, motion_, parameters_.odometry), engine_);
-  const double position_sigma = parameters_.odometry.position_walk * std::sqrt(duration_s);
-  const double heading_sigma = parameters_.odometry.heading_walk * std::sqrt(duration_s);
-  if (position_sigma > 0.0 || heading_sigma > 0.0) {
-    for (std::size_t i = 0; i < particles_.size(); ++i) {
-      particles_.x[i] += position_sigma * draw_normal(engine_);
-      particles_.y[i] += position_sigma * draw_normal(engine_);
-      particles_.yaw[i] = wrap_angle(particles_.yaw[i] + heading_sigma * draw_normal(engine_));
-    }
-  }
-  estimate_ = urban_gnss::move(estimate_, urban_gnss::corrected(twist, mean_errors_), duration_s);
+  receiver_.move(twist, duration_s);
+  const MotionStep step = make_motion_step(twist, duration_s, motion_, parameters_.model.odometry);
+  for (BiasHypothesis& each : hypotheses_) predict(each.state, step, parameters_.model.odometry);
+  update_estimate();
 }
 
-FixVerdict SwitchingParticleFilter::correct(const FixMeasurement& fix) {
+bool SwitchingParticleFilter::continue_all(const FixMeasurement& fix, Opinion& opinion) {
+  const double elapsed_s = receiver_.elapsed_s(fix.time_s);
+  const FixNoise noise = receiver_.fix_noise(fix.time_s);
+  const ModeTransition transition = mode_transition(elapsed_s, parameters_.model.modes, bias_odds_);
+  next_.clear();
+  for (const BiasHypothesis& before : hypotheses_) {
+    for (const BiasMode to : kModes) {
+      next_.push_back({before.state, to, 0.0});
+      BiasHypothesis& next = next_.back();
+      continue_bias(next.state, before.mode, to, elapsed_s, parameters_.model.modes);
+      next.weight = before.weight * transition(static_cast<int>(index_of(before.mode)), static_cast<int>(index_of(to)));
+    }
+  }
+  reducer_.merge(next_, parameters_.merge_distance);
+  updates_.clear();
+  double largest = -std::numeric_limits<double>::infinity();
+  for (BiasHypothesis& next : next_) {
+    updates_.push_back(take_fix(next.state, next.mode, fix, noise, parameters_.model));
+    next.mode = lasting(next.mode);
+    next.weight = std::log(next.weight) + updates_.back().log_likelihood;
+    if (!next.state.is_finite() || std::isnan(next.weight)) next.weight = -std::numeric_limits<double>::infinity();
+    largest = std::max(largest, next.weight);
+  }
+  if (!std::isfinite(largest)) return false;
+  double sum = 0.0;
+  for (BiasHypothesis& next : next_) sum += next.weight = std::exp(next.weight - largest);
+  for (std::size_t i = 0; i < next_.size(); ++i) {
+    next_[i].weight /= sum;
+    opinion.outlier += next_[i].weight * updates_[i].outlier;
+    if (updates_[i].white_nis > LearntScale::kMedianNis) opinion.exceeding += next_[i].weight;
+  }
+  return true;
+}
+
+FixVerdict SwitchingParticleFilter::correct(const FixMeasurement& declared) {
   FixVerdict verdict;
-  if (!is_usable(fix)) {
+  if (!is_usable(declared)) {
     verdict.decision = FixDecision::kRejectedNonFinite;
     verdict.reason = "position, time or covariance cannot be used";
     return verdict;
   }
-  SwitchingFix seen;
-  seen.position = fix.position;
-  seen.antenna_in_body = fix.antenna_in_body;
-  const double factor = 0.5 * noise_.scale() * noise_.correlation_inflation(fix.time_s);
-  seen.direct_variance = factor * parameters_.fix.direct_covariance(fix.covariance).trace();
-  seen.shadow_variance = factor * parameters_.fix.shadow_covariance(fix.covariance).trace();
-  seen.elapsed_s = last_fix_s_ ? std::max(fix.time_s - *last_fix_s_, 0.0) : moved_s_;
-  last_fix_s_ = fix.time_s;
-  noise_.learn(fix.time_s, is_beyond_median(fix, seen.elapsed_s) ? 1.0 : 0.0);
-  examine(fix, verdict);
-
-  continue_all(seen);
-  if (!particles_.normalise()) {
+  const FixMeasurement fix = receiver_.believed(declared);
+  const BiasGaussian before = mixture();
+  const Eigen::Vector2d innovation = fix.position - transform_point(estimate_, fix.antenna_in_body);
+  const Eigen::Matrix2d covariance =
+      before.covariance.topLeftCorner<2, 2>() + parameters_.model.fix.direct_covariance(fix.covariance);
+  verdict.nis = innovation.dot(covariance.inverse() * innovation);
+  verdict.nis_dof = kFixDof;
+  verdict.nis_threshold = nis_threshold_;
+  Opinion opinion;
+  if (!continue_all(fix, opinion)) {
     verdict.decision = FixDecision::kRejectedDegenerate;
-    verdict.reason = "no particle has a usable weight; weights set equal";
+    verdict.reason = "no particle can take the fix";
     return verdict;
   }
-  double outliers = 0.0;
-  for (std::size_t i = 0; i < particles_.size(); ++i) outliers += is_outlier_[i] * particles_.weight[i];
-  verdict.decision = mode_probabilities()[0] >= 0.5 ? FixDecision::kAccepted : FixDecision::kBiasCompensated;
-  if (outliers > 0.5) {
-    verdict.decision = FixDecision::kInflated;
-    verdict.reason = "outlier, probability " + std::to_string(outliers);
-  }
+  reducer_.select(next_, most_, engine_);
+  hypotheses_.swap(next_);
+  receiver_.learn_fix(fix.time_s, opinion.exceeding);
+  receiver_.compare_with_odometry(fix, before, mixture());
+  draw_cloud();
+  find_clusters();
 
-  effective_sample_size_ = urban_gnss::effective_sample_size(particles_);
-  update_estimate();
-  if (effective_sample_size_ < kResamplingShare * static_cast<double>(particles_.size())) resample();
+  verdict.decision = mode_probabilities()[0] >= 0.5 ? FixDecision::kAccepted : FixDecision::kBiasCompensated;
+  if (opinion.outlier > 0.5) {
+    verdict.decision = FixDecision::kInflated;
+    verdict.reason = "outlier, probability " + std::to_string(opinion.outlier);
+  }
   return verdict;
 }
 
-void SwitchingParticleFilter::resample() {
-  // Of the heaviest cluster, before its particles are equal.
-  using Vector5 = Eigen::Matrix<double, kErrorStates, 1>;
-  ErrorCovariance covariance = ErrorCovariance::Zero();
-  double mass = 0.0;
-  for (std::size_t i = 0; i < particles_.size(); ++i) {
-    if (!clusters_.is_in_heaviest(i)) continue;
-    Vector5 offset;
-    offset << particles_.x[i] - estimate_.x, particles_.y[i] - estimate_.y,
-        angle_difference(particles_.yaw[i], estimate_.yaw), errors_.speed_scale[i] - mean_errors_.speed_scale,
-        errors_.yaw_rate_bias[i] - mean_errors_.yaw_rate_bias_radps;
-    covariance += particles_.weight[i] * offset * offset.transpose();
-    mass += particles_.weight[i];
+void SwitchingParticleFilter::correct_velocity(const VelocityMeasurement& measured) {
+  if (!is_usable(measured)) return;
+  const Eigen::Matrix2d noise = receiver_.velocity_scale() * measured.covariance;
+  next_ = hypotheses_;
+  double exceeding = 0.0;
+  double largest = -std::numeric_limits<double>::infinity();
+  for (BiasHypothesis& next : next_) {
+    const BiasEkfUpdate update = take_velocity(next.state, measured, noise, parameters_.model.velocity.velocity_dof);
+    if (!next.state.is_finite() || std::isnan(update.log_likelihood)) return;
+    if (update.nis > LearntScale::kMedianNis) exceeding += next.weight;
+    next.weight = std::log(next.weight) + update.log_likelihood;
+    largest = std::max(largest, next.weight);
   }
+  if (!std::isfinite(largest)) return;
+  double sum = 0.0;
+  for (BiasHypothesis& next : next_) sum += next.weight = std::exp(next.weight - largest);
+  for (BiasHypothesis& next : next_) next.weight /= sum;
+  const BiasGaussian before = mixture();
+  hypotheses_.swap(next_);
+  receiver_.learn_velocity(exceeding, before, mixture());
+  find_clusters();
+}
 
-  resampler_.resample(particles_, engine_);
-  for (auto* values : {&biases_.x, &biases_.y, &biases_.variance, &errors_.speed_scale, &errors_.yaw_rate_bias}) {
-    resampler_.gather(*values);
-  }
-  const std::vector<std::uint32_t>& parents = resampler_.parents();
-  for (std::size_t i = 0; i < parents.size(); ++i) modes_before_[i] = biases_.mode[parents[i]];
-  biases_.mode.swap(modes_before_);
-
-  if (!(mass > 0.0) || !covariance.allFinite()) return;
-  const Eigen::SelfAdjointEigenSolver<ErrorCovariance> axes(covariance / mass);
-  const ErrorCovariance root =
-      kKernel * axes.eigenvectors() * axes.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
-  for (std::size_t i = 0; i < particles_.size(); ++i) {
-    Vector5 draw;
-    for (int axis = 0; axis < kErrorStates; ++axis) draw[axis] = draw_normal(engine_);
-    const Vector5 shift = root * draw;
-    particles_.x[i] += shift[0];
-    particles_.y[i] += shift[1];
-    particles_.yaw[i] = wrap_angle(particles_.yaw[i] + shift[2]);
-    errors_.speed_scale[i] += shift[3];
-    errors_.yaw_rate_bias[i] += shift[4];
-    if (biases_.mode[i] == BiasMode::kDirect) continue;
-    biases_.x[i] -= shift[0];
-    biases_.y[i] -= shift[1];
+void SwitchingParticleFilter::draw_cloud() {
+  draws_.clear();
+  for (std::size_t i = 0; i < hypotheses_.size(); ++i) {
+    const double x = draw_normal(engine_);
+    const double y = draw_normal(engine_);
+    draws_.emplace_back(x, y, draw_normal(engine_));
   }
 }
 
-void SwitchingParticleFilter::continue_all(const SwitchingFix& fix) {
-  const BiasModeParameters& p = parameters_.modes;
-  const ModeTransition transition = mode_transition(fix.elapsed_s, p, bias_odds_);
-  const double fade = bias_fade(fix.elapsed_s, p);
-  const double log_2pi = std::log(2.0 * kPi);
-  const double log_outlier = std::log(p.outlier_density());  // -infinity where there are none
-  Eigen::Matrix<double, kLastingModes, kContinuations> log_prior =
-      transition.array().log() + (std::log1p(-p.outlier_share) - log_2pi);  // and the density's constant
-
-  // What a continuation begins with does not depend on the particle, but for the bias that goes on.
-  double noise[kContinuations];
-  double begun[kLastingModes][kContinuations];      // variance of the difference
-  double log_begun[kLastingModes][kContinuations];  // its logarithm
-  for (std::size_t m = 0; m < kLastingModes; ++m) {
-    for (std::size_t j = 0; j < kContinuations; ++j) {
-      noise[j] = kModes[j] == BiasMode::kDirect ? fix.direct_variance : fix.shadow_variance;
-      begun[m][j] = predict_bias({}, kModes[m], kModes[j], fix.elapsed_s, p).variance + noise[j];
-      log_begun[m][j] = std::log(begun[m][j]);
+void SwitchingParticleFilter::find_clusters() {
+  // The heaviest are first, but for what a velocity has changed.
+  const std::size_t count = hypotheses_.size();
+  constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
+  cluster_.assign(count, kNone);
+  cluster_mass_.clear();
+  const double cell2 = parameters_.cluster_cell * parameters_.cluster_cell;
+  for (std::size_t centre = 0; centre < count; ++centre) {
+    if (cluster_[centre] != kNone) continue;
+    const auto cluster = static_cast<std::uint32_t>(cluster_mass_.size());
+    cluster_mass_.push_back(0.0);
+    const BiasGaussian& middle = hypotheses_[centre].state;
+    for (std::size_t i = centre; i < count; ++i) {
+      if (cluster_[i] != kNone) continue;
+      const BiasGaussian& state = hypotheses_[i].state;
+      const Eigen::Vector2d apart = state.mean.head<2>() - middle.mean.head<2>();
+      const Eigen::Matrix2d covariance = state.covariance.topLeftCorner<2, 2>() +
+                                         middle.covariance.topLeftCorner<2, 2>() + cell2 * Eigen::Matrix2d::Identity();
+      if (i != centre && apart.dot(covariance.inverse() * apart) > kClusterSigmas * kClusterSigmas) continue;
+      cluster_[i] = cluster;
+      cluster_mass_.back() += hypotheses_[i].weight;
     }
   }
-  const bool has_lever = !fix.antenna_in_body.isZero(0.0);
-  for (std::size_t i = 0; i < particles_.size(); ++i) {
-    const std::size_t m = index_of(biases_.mode[i]);
-    Eigen::Vector2d difference(fix.position.x() - particles_.x[i], fix.position.y() - particles_.y[i]);
-    if (has_lever) difference = fix.position - transform_point(particles_.pose(i), fix.antenna_in_body);
-    const Eigen::Vector2d mean(biases_.x[i], biases_.y[i]);  // 0 in the direct mode
-    const double without = 0.5 * difference.squaredNorm();
-    const double with = 0.5 * (difference - fade * mean).squaredNorm();
-    const double variance = fade * fade * biases_.variance[i];
-
-    double exponent[kContinuations + 1];
-    double largest = exponent[kOutlier] = log_outlier;
-    for (std::size_t j = 0; j < kContinuations; ++j) {
-      const bool goes_on = m != 0 && (kModes[j] == BiasMode::kSlow || kModes[j] == BiasMode::kFast);
-      const double s = goes_on ? variance + begun[m][j] : begun[m][j];
-      const double log_s = goes_on ? std::log(s) : log_begun[m][j];
-      const double shape = kModes[j] == BiasMode::kDirect ? log_student(2.0 * without / s, p.student_dof)
-                                                          : -(goes_on ? with : without) / s;
-      exponent[j] = log_prior(static_cast<int>(m), static_cast<int>(j)) - log_s + shape;
-      largest = std::max(largest, exponent[j]);
-    }
-    double sum = 0.0;
-    for (double& e : exponent) sum += e = std::exp(e - largest);
-    particles_.log_weight[i] += largest + std::log(sum);
-
-    double rest = 0.0;
-    std::size_t chosen =
-        choose([&](std::size_t j) { return exponent[j]; }, kContinuations + 1, draw_uniform(engine_) * sum, rest);
-    is_outlier_[i] = chosen == kOutlier;
-    if (is_outlier_[i]) {
-      chosen = choose([&](std::size_t j) { return transition(static_cast<int>(m), static_cast<int>(j)); },
-                      kContinuations, rest, rest);
-    }
-    const BiasMode to = kModes[chosen];
-    BiasState next = predict_bias(biases_.bias(i), biases_.mode[i], to, fix.elapsed_s, p);
-    if (!is_outlier_[i] && to != BiasMode::kDirect) next = corrected(next, difference, fix.shadow_variance);
-    biases_.mode[i] = lasting(to);
-    biases_.x[i] = next.mean.x();
-    biases_.y[i] = next.mean.y();
-    biases_.variance[i] = next.variance;
-  }
-}
-
-bool SwitchingParticleFilter::is_beyond_median(const FixMeasurement& fix, double elapsed_s) const {
-  const double fade = bias_fade(elapsed_s, parameters_.modes);
-  Eigen::Vector2d mean = Eigen::Vector2d::Zero();
-  Eigen::Matrix2d square = Eigen::Matrix2d::Zero();
-  for (std::size_t i = 0; i < particles_.size(); ++i) {
-    Eigen::Vector2d difference = fix.position - transform_point(particles_.pose(i), fix.antenna_in_body);
-    double variance = 0.0;
-    if (biases_.mode[i] != BiasMode::kDirect) {
-      difference -= fade * Eigen::Vector2d(biases_.x[i], biases_.y[i]);
-      variance = fade * fade * biases_.variance[i] + bias_growth(biases_.mode[i], elapsed_s, parameters_.modes);
-    }
-    mean += particles_.weight[i] * difference;
-    square += particles_.weight[i] * (difference * difference.transpose() + variance * Eigen::Matrix2d::Identity());
-  }
-  const Eigen::Matrix2d covariance =
-      square - mean * mean.transpose() + noise_.scale() * parameters_.fix.direct_covariance(fix.covariance);
-  return mean.dot(covariance.ldlt().solve(mean)) > LearntScale::kMedianNis;
-}
-
-void SwitchingParticleFilter::examine(const FixMeasurement& fix, FixVerdict& verdict) const {
-  const Eigen::Matrix2d spread = covariance_about(particles_, estimate_).topLeftCorner<2, 2>();
-  const Eigen::Vector2d innovation = fix.position - transform_point(estimate_, fix.antenna_in_body);
-  const Eigen::Matrix2d covariance = spread + parameters_.fix.direct_covariance(fix.covariance);
-  verdict.nis = innovation.dot(covariance.ldlt().solve(innovation));
-  verdict.nis_dof = kFixDof;
-  verdict.nis_threshold = nis_threshold_;
+  heaviest_ =
+      static_cast<std::uint32_t>(std::max_element(cluster_mass_.begin(), cluster_mass_.end()) - cluster_mass_.begin());
+  double squares = 0.0;
+  for (const BiasHypothesis& each : hypotheses_) squares += each.weight * each.weight;
+  effective_sample_size_ = 1.0 / squares;
+  update_estimate();
 }
 
 void SwitchingParticleFilter::update_estimate() {
-  clusters_.find(particles_);
-  estimate_ = parameters_.estimate == EstimateMethod::kHeaviestCluster ? clusters_.heaviest_mean(particles_)
-                                                                       : circular_mean(particles_);
-  mean_errors_ = {};
-  for (std::size_t i = 0; i < particles_.size(); ++i) {
-    mean_errors_.speed_scale += particles_.weight[i] * errors_.speed_scale[i];
-    mean_errors_.yaw_rate_bias_radps += particles_.weight[i] * errors_.yaw_rate_bias[i];
+  const bool is_of_all = parameters_.estimate == EstimateMethod::kMean;
+  Eigen::Vector4d sums = Eigen::Vector4d::Zero();
+  double mass = 0.0;
+  for (std::size_t i = 0; i < hypotheses_.size(); ++i) {
+    if (!is_of_all && cluster_[i] != heaviest_) continue;
+    const BiasHypothesis& each = hypotheses_[i];
+    sums += each.weight * Eigen::Vector4d(each.state.mean[0], each.state.mean[1], std::cos(each.state.mean[kYaw]),
+                                          std::sin(each.state.mean[kYaw]));
+    mass += each.weight;
   }
+  estimate_ = {sums[0] / mass, sums[1] / mass, std::atan2(sums[3], sums[2])};
+
+  particles_.resize(hypotheses_.size());
+  for (std::size_t i = 0; i < hypotheses_.size(); ++i) {
+    const BiasGaussian& state = hypotheses_[i].state;
+    const Eigen::LLT<Eigen::Matrix3d> root(state.covariance.topLeftCorner<3, 3>());
+    const Eigen::Vector3d offset =
+        root.info() == Eigen::Success ? Eigen::Vector3d(root.matrixL() * draws_[i]) : Eigen::Vector3d::Zero().eval();
+    particles_.x[i] = state.mean[0] + offset[0];
+    particles_.y[i] = state.mean[1] + offset[1];
+    particles_.yaw[i] = wrap_angle(state.mean[kYaw] + offset[kYaw]);
+    particles_.weight[i] = hypotheses_[i].weight;
+    particles_.log_weight[i] = std::log(hypotheses_[i].weight);
+  }
+}
+
+PoseEstimate SwitchingParticleFilter::estimate() const {
+  PoseEstimate estimate{estimate_, Eigen::Matrix3d::Zero()};
+  for (const BiasHypothesis& each : hypotheses_) {
+    const Eigen::Vector3d apart(each.state.mean[0] - estimate_.x, each.state.mean[1] - estimate_.y,
+                                angle_difference(each.state.mean[kYaw], estimate_.yaw));
+    estimate.covariance += each.weight * (each.state.covariance.topLeftCorner<3, 3>() + apart * apart.transpose());
+  }
+  estimate.covariance.diagonal().head<2>().array() += receiver_.common_variance_m2();
+  return estimate;
+}
+
+LocalizerHealth SwitchingParticleFilter::health() const {
+  LocalizerHealth health;
+  double cosine = 0.0;
+  double sine = 0.0;
+  for (const BiasHypothesis& each : hypotheses_) {
+    const double length = each.weight * std::exp(-0.5 * each.state.covariance(kYaw, kYaw));
+    cosine += length * std::cos(each.state.mean[kYaw]);
+    sine += length * std::sin(each.state.mean[kYaw]);
+  }
+  health.heading_sigma_rad = std::sqrt(-2.0 * std::log(std::min(1.0, std::hypot(cosine, sine))));
+  health.particle_count = static_cast<std::uint32_t>(hypotheses_.size());
+  health.effective_sample_size = effective_sample_size_;
+  health.position_spread_m = std::sqrt(mixture().covariance.topLeftCorner<2, 2>().trace());
+  health.cluster_mass = cluster_mass_[heaviest_];
+  health.cluster_count = static_cast<std::uint32_t>(cluster_mass_.size());
+  return health;
+}
+
+BiasGaussian SwitchingParticleFilter::mixture() const {
+  return match_moments(
+      hypotheses_.size(), [this](std::size_t i) -> const BiasGaussian& { return hypotheses_[i].state; },
+      [this](std::size_t i) { return hypotheses_[i].weight; });
 }
 
 ModeProbabilities SwitchingParticleFilter::mode_probabilities() const {
   ModeProbabilities probabilities = ModeProbabilities::Zero();
-  for (std::size_t i = 0; i < particles_.size(); ++i) {
-    probabilities[static_cast<int>(index_of(biases_.mode[i]))] += particles_.weight[i];
+  for (const BiasHypothesis& each : hypotheses_) {
+    probabilities[static_cast<int>(index_of(each.mode))] += each.weight;
   }
   return probabilities;
 }

@@ -108,9 +108,8 @@ TEST(ParticleFilter, EveryParameterHasAnEffectF36) {
       {"seed: 2", "{}"},
   };
   // Those of the mode switching have a test of their own.
-  const std::size_t others = parameter_names(BiasModeParameters{}).size() +
-                             parameter_names(OdometryErrorParameters{}).size() +
-                             parameter_names(FixNoiseModelParameters{}).size();
+  const std::size_t others = parameter_names(SwitchingModelParameters{}).size() -
+                             parameter_names(FixSigmaParameters{}).size() + 2;  // max_particles, merge_distance
   EXPECT_EQ(changes.size() + others, parameter_names(ParticleFilterParameters{}).size());
   for (const auto& [change, base] : changes) {
     EXPECT_FALSE(drive(with(small(base), change)) == drive(small(base))) << change;
@@ -155,8 +154,8 @@ TEST(ParticleFilter, ParkedRobotWithGoodFixesStaysWhereItIs) {
 /// Root mean square error over 20 s in a shadow whose bias grows to 4 m along x in 4 s and stays; its length is known.
 double error_in_shadow(const std::string& mode, std::uint64_t seed) {
   ParticleFilterParameters parameters = with(ParticleFilterParameters{}, mode);
-  parameters.fix.direct_sigma = 0.1;
-  parameters.fix.shadow_sigma = 0.3;
+  parameters.model.fix.direct_sigma = 0.1;
+  parameters.model.fix.shadow_sigma = 0.3;
   parameters.cluster_cell = 0.5;
   parameters.seed = static_cast<int>(seed);
   MotionParameters motion;

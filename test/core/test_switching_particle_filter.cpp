@@ -3,7 +3,6 @@
 #include <Eigen/Dense>
 #include <cmath>
 #include <limits>
-#include <map>
 
 #include "switching_rig.hpp"
 #include "urban_gnss_localization/filters/imm_ekf.hpp"
@@ -15,84 +14,123 @@ namespace {
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 ParticleFilterParameters switching(const std::string& changes = "{}") {
-  return with(with(with(ParticleFilterParameters{}, "mode: switching"), kTextbookNoise), changes);
+  return with(
+      with(with(ParticleFilterParameters{}, "{mode: switching, yaw_rate_scale_sigma: 0.0, common_error_sigma: 0.0}"),
+           kTextbookNoise),
+      changes);
 }
 SwitchingParticleFilter make(const std::string& changes = "{}") { return {switching(changes), {}}; }
 
-TEST(SwitchingParticleFilter, ArraysAgreeWithThePlainForm) {
-  std::map<BiasMode, int> seen;
-  for (const char* changes : {"{}", "{student_dof: 2.0, bias_fade_time: 5.0}",
-                              "{outlier_share: 0.0, jump_share: 0.2, direct_time: 3.0, fast_bias_time: 2.0}",
-                              "{outlier_share: 0.4, outlier_radius: 3.0, direct_time: 1.0, jump_share: 0.3}"}) {
-    const ParticleFilterParameters p = with(switching(changes), "{particle_count: 400, shadow_sigma: 4.0}");
-    const PoseEstimate start = pose_with_sigma({3.0, -1.0, 0.5}, 0.05, 0.02);  // close together: nothing is resampled
-    SwitchingParticleFilter filter(p, {});
-    filter.initialize(start);
-    RandomEngine engine = make_engine(1);
-    ParticleSet plain(400);
-    plain.draw_gaussian(start, engine);
-    std::vector<BiasMode> modes(400);
-    std::vector<BiasState> biases(400);
-    double last_s = 0.0;
-    const std::pair<double, Eigen::Vector2d> fixes[] = {
-        {0.0, {3.0, -1.0}}, {1.0, {6.0, 1.0}}, {2.5, {6.5, 1.5}}, {3.0, {3.0, -0.5}}, {30.0, {8.0, -5.0}}};
-    for (const auto& [time_s, position] : fixes) {
-      FixMeasurement fix = fix_of(position, 3.0, time_s);
-      fix.antenna_in_body = {time_s, -0.5 * time_s};
-      filter.correct(fix);
-      const SwitchingFix as_seen{position, fix.antenna_in_body, 9.0, 16.0, time_s - last_s};
-      last_s = time_s;
-      const ModeTransition transition = mode_transition(as_seen.elapsed_s, p.modes);
-      for (std::size_t i = 0; i < 400; ++i) {
-        const ParticleContinuation next =
-            continue_particle(plain.pose(i), modes[i], biases[i], as_seen, transition, p.modes, draw_uniform(engine));
-        modes[i] = next.mode;
-        biases[i] = next.bias;
-        plain.log_weight[i] += next.log_likelihood;
-        ++seen[next.mode];
-      }
-      ASSERT_TRUE(plain.normalise());
-      ASSERT_GT(filter.effective_sample_size(), 200.0);
-      for (std::size_t i = 0; i < 400; ++i) {
-        ASSERT_EQ(filter.biases().mode[i], modes[i]) << i;
-        ASSERT_LT((filter.biases().bias(i).mean - biases[i].mean).norm(), 1e-9) << i;
-        ASSERT_NEAR(filter.biases().variance[i], biases[i].variance, 1e-9) << i;
-        ASSERT_NEAR(filter.particles().weight[i], plain.weight[i], 1e-12) << i;
-      }
+/// Up to the second fix, mixing and particles are the same: all that may have happened, with its moments.
+TEST(SwitchingParticleFilter, FirstFixIsTheInteractingModels) {
+  for (const char* changes :
+       {"{}", "{student_dof: 2.0, bias_fade_time: 5.0}", "{outlier_share: 0.4, outlier_radius: 3.0}",
+        "{direct_time: 1.0, jump_share: 0.3, shadow_sigma: 4.0}"}) {
+    SwitchingParticleFilter particles = make(changes);
+    ImmEkf imm(switching(changes).model, {});
+    for (Localizer* filter : {static_cast<Localizer*>(&particles), static_cast<Localizer*>(&imm)}) {
+      filter->initialize(pose_with_sigma({3.0, -1.0, 0.5}, 1.0, 0.1));
+      for (int k = 0; k < 20; ++k) filter->move({2.0, 0.1}, 0.1);
+      VelocityMeasurement velocity;
+      velocity.antenna_velocity_in_body = {2.0, 0.2};
+      velocity.velocity = {1.0, 1.7};
+      velocity.covariance = isotropic(0.1);
+      filter->correct_velocity(velocity);
+      FixMeasurement fix = fix_of({9.0, 4.0}, 1.5, 2.0);
+      fix.antenna_in_body = {1.0, -0.5};
+      filter->correct(fix);
     }
+    const BiasGaussian a = particles.mixture();
+    const BiasGaussian b = imm.mixture();
+    EXPECT_LT((a.mean - b.mean).norm(), 1e-2) << changes;  // but for what is negligible
+    EXPECT_LT((a.covariance - b.covariance).norm(), 1e-2 * b.covariance.norm()) << changes;
+    EXPECT_LT((particles.mode_probabilities() - imm.mode_probabilities()).norm(), 1e-3) << changes;
+    EXPECT_GT(particles.hypotheses().size(), 1u);
   }
-  EXPECT_EQ(seen.size(), kLastingModes);  // every mode occurred
 }
 
-/// The sum over the continuations, against one density each and numerical integration over the bias.
-TEST(SwitchingParticleFilter, LikelihoodIsTheIntegralOverTheBias) {
-  BiasModeParameters p;
-  p.outlier_share = 0.0;
-  p.student_dof = 1e9;
-  const BiasState bias{{4.0, -2.0}, 1.5};
-  const SwitchingFix fix{{5.0, 0.5}, {0.0, 0.0}, 4.0, 9.0, 2.0};
-  const ModeTransition t = mode_transition(fix.elapsed_s, p);
-  double expected = 0.0;
-  for (int j = 0; j < 4; ++j) {
-    const auto to = static_cast<BiasMode>(j);
-    const BiasState before = predict_bias(bias, BiasMode::kSlow, to, fix.elapsed_s, p);
-    const double noise = j == 0 ? 4.0 : 9.0;
-    double axis[2];
-    for (int a = 0; a < 2; ++a) {
-      if (before.variance == 0.0) {
-        axis[a] = std::exp(-0.5 * fix.position[a] * fix.position[a] / noise) / std::sqrt(2.0 * kPi * noise);
-        continue;
-      }
-      axis[a] = 0.0;
-      const double sigma = std::sqrt(before.variance);
-      for (double u = -8.0; u < 8.0; u += 0.001) {
-        const double d = fix.position[a] - before.mean[a] - sigma * u;
-        axis[a] += 0.001 * std::exp(-0.5 * u * u - 0.5 * d * d / noise) / (2.0 * kPi * std::sqrt(noise));
-      }
+/// Where all particles of a mode are merged, what is left is imm_ekf, the plain reference of one step and of all.
+TEST(SwitchingParticleFilter, MergedParticlesAreTheInteractingModels) {
+  for (const char* changes :
+       {"{}", "{student_dof: 2.0, bias_fade_time: 5.0, fix_scale_rate: 0.05, fix_correlation_time: 2.0}"}) {
+    SwitchingDrive d;
+    d.bias = bias_between(40.0, 80.0, {15.0, -8.0});
+    SwitchingParticleFilter particles(with(switching(changes), "merge_distance: 1.0e+12"), {});
+    ImmEkf imm(switching(changes).model, {});
+    const auto a = drive(particles, d);
+    const auto b = drive(imm, d);
+    for (std::size_t i = 0; i < a.size(); ++i) {
+      // But for modes that are negligible, and left out at random.
+      ASSERT_TRUE(near(a[i].estimate.pose, b[i].estimate.pose, 0.02)) << a[i].time_s;
+      ASSERT_EQ(a[i].verdict.decision, b[i].verdict.decision) << a[i].time_s;
     }
-    expected += t(1, j) * axis[0] * axis[1];
   }
-  EXPECT_NEAR(continue_particle({}, BiasMode::kSlow, bias, fix, t, p, 0.5).log_likelihood, std::log(expected), 1e-6);
+}
+
+TEST(SwitchingParticleFilter, VelocityCorrectsAndWeighsHeadings) {
+  SwitchingParticleFilter filter = make();
+  filter.initialize(pose_with_sigma({}, 1.0, kPi));
+  EXPECT_EQ(filter.hypotheses().size(), 100u);
+  EXPECT_GT(filter.health().heading_sigma_rad, 2.0);
+  VelocityMeasurement velocity;
+  velocity.antenna_velocity_in_body = {5.0, 0.0};
+  velocity.velocity = {5.0 * std::cos(2.2), 5.0 * std::sin(2.2)};
+  velocity.covariance = isotropic(0.1);
+  for (int k = 0; k < 5; ++k) filter.correct_velocity(velocity);
+  EXPECT_NEAR(filter.pose().yaw, 2.2, 0.05);
+  EXPECT_LT(filter.health().heading_sigma_rad, 0.1);
+  const Pose2 before = filter.pose();
+  velocity.velocity.x() = kNaN;
+  filter.correct_velocity(velocity);
+  EXPECT_TRUE(filter.pose() == before);
+}
+
+TEST(SwitchingParticleFilter, NumberOfParticlesAdaptsItself) {
+  SwitchingParticleFilter filter = make();
+  SwitchingDrive d;
+  d.bias = bias_between(40.0, 80.0, {4.0, -3.0});
+  drive(filter, d);
+  EXPECT_LT(filter.hypotheses().size(), 60u);
+  EXPECT_EQ(filter.health().particle_count, filter.hypotheses().size());
+  EXPECT_EQ(filter.particles().size(), filter.hypotheses().size());
+  filter.initialize(pose_with_sigma({}, 1.0, kPi));
+  EXPECT_EQ(filter.health().particle_count, 100u);
+}
+
+/// The slices together are the Gaussian that was given.
+TEST(SwitchingParticleFilter, SlicesOfAHeadingAreTheStart) {
+  SwitchingParticleFilter filter = make();
+  PoseEstimate start = pose_with_sigma({1.0, 2.0, 3.0}, 1.0, 0.5);
+  start.covariance(0, 2) = start.covariance(2, 0) = 0.3;
+  filter.initialize(start);
+  EXPECT_GT(filter.hypotheses().size(), 50u);
+  const BiasGaussian all = filter.mixture();
+  EXPECT_NEAR(all.mean[0], 1.0, 1e-3);
+  EXPECT_NEAR(angle_difference(all.mean[2], 3.0), 0.0, 1e-3);
+  EXPECT_LT((all.covariance.topLeftCorner<3, 3>() - start.covariance).norm(), 0.05);
+}
+
+/// Two fixes that contradict each other, of a robot that knows little of its place: one of them has a bias.
+void see_two_places(SwitchingParticleFilter& filter) {
+  filter.initialize(pose_with_sigma({}, 8.0, 0.1));
+  filter.move({0.0, 0.0}, 1.0);
+  filter.correct(fix_of({0.0, 0.0}, 0.2, 1.0));
+  filter.correct(fix_of({15.0, 0.0}, 0.2, 2.0));
+}
+const char* const kOftenBiased = "{direct_time: 2.0, bias_end_time: 2.0, onset_sigma: 0.1}";
+
+TEST(SwitchingParticleFilter, EstimateIsOfTheHeaviestClusterF32) {
+  SwitchingParticleFilter filter = make(kOftenBiased);
+  see_two_places(filter);
+  const LocalizerHealth health = filter.health();
+  EXPECT_GE(health.cluster_count, 2u);
+  EXPECT_LT(health.cluster_mass, 0.9);
+  const double x = filter.pose().x;
+  EXPECT_TRUE(std::abs(x) < 1.0 || std::abs(x - 15.0) < 1.0) << x;
+  // The other place is in the covariance.
+  EXPECT_GT(std::sqrt(filter.estimate().covariance(0, 0)), 3.0);
+  EXPECT_LT(std::sqrt(filter.estimate().covariance(1, 1)), 3.0);
+  EXPECT_GT(health.position_spread_m, 3.0);
 }
 
 TEST(SwitchingParticleFilter, SameSeedSameNumbersF26) {
@@ -125,7 +163,7 @@ TEST(SwitchingParticleFilter, AgreesWithTheInteractingModels) {
     d.seed = seed;
     d.bias = bias_between(40.0, 80.0, {6.0, 12.0});
     SwitchingParticleFilter particles = make();
-    ImmEkf imm(with(ImmEkfParameters{}, kTextbookNoise), {});
+    ImmEkf imm(switching().model, {});
     const auto a = drive(particles, d);
     const auto b = drive(imm, d);
     double squares = 0.0;
@@ -159,7 +197,7 @@ TEST(SwitchingParticleFilter, CovarianceIsHonestF14) {
 }
 
 TEST(SwitchingParticleFilter, FindsAnUnknownHeadingF16) {
-  SwitchingParticleFilter filter = make("particle_count: 4000");
+  SwitchingParticleFilter filter = make();
   PoseEstimate start = pose_with_sigma({}, 1.0, kPi);
   filter.initialize(start);
   RandomEngine engine = make_engine(5);
@@ -188,7 +226,7 @@ TEST(SwitchingParticleFilter, ASpikeSaysNothing) {
 TEST(SwitchingParticleFilter, RefusesWhatIsNotFiniteAndSurvivesALongOutage) {
   SwitchingParticleFilter filter = make();
   drive(filter, {});
-  const ParticleSet before = filter.particles();
+  const std::vector<BiasHypothesis> before = filter.hypotheses();
   FixMeasurement fix = fix_of({kNaN, 0.0}, 1.0, 121.0);
   EXPECT_EQ(filter.correct(fix).decision, FixDecision::kRejectedNonFinite);
   fix = fix_of({1.0, 0.0}, 1.0, kNaN);
@@ -198,8 +236,11 @@ TEST(SwitchingParticleFilter, RefusesWhatIsNotFiniteAndSurvivesALongOutage) {
   EXPECT_EQ(filter.correct(fix).decision, FixDecision::kRejectedNonFinite);
   filter.move({kNaN, 0.0}, 0.1);
   filter.move({1.0, 0.0}, -1.0);
-  EXPECT_EQ(filter.particles().x, before.x);
-  EXPECT_EQ(filter.particles().weight, before.weight);
+  ASSERT_EQ(filter.hypotheses().size(), before.size());
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    EXPECT_EQ(filter.hypotheses()[i].state.mean, before[i].state.mean);
+    EXPECT_EQ(filter.hypotheses()[i].weight, before[i].weight);
+  }
   EXPECT_THROW(filter.initialize(pose_with_sigma({0.0, kNaN, 0.0}, 1.0, 1.0)), std::invalid_argument);
 
   drive(filter, {});
@@ -221,12 +262,11 @@ TEST(SwitchingParticleFilter, FixThatNoParticleExplainsDoesNotAbortF30) {
 
 TEST(SwitchingParticleFilter, EveryParameterHasAnEffectF36) {
   const std::vector<std::pair<std::string, std::string>> changes = {
-      {"particle_count: 290", "{}"},
+      {"max_particles: 3", "{}"},
+      {"merge_distance: 5.0", "{}"},
       {"use_fix_covariance: false", "{}"},
       {"direct_sigma: 1.0", "{}"},
       {"shadow_sigma: 1.0", "{}"},
-      {"estimate: mean", "cluster_cell: 0.1"},
-      {"cluster_cell: 0.1", "{}"},
       {"seed: 2", "{}"},
       {"direct_time: 20.0", "{}"},
       {"slow_bias_time: 5.0", "{}"},
@@ -251,16 +291,35 @@ TEST(SwitchingParticleFilter, EveryParameterHasAnEffectF36) {
       {"fix_scale_rate: 0.1", "{}"},
       {"fix_scale_limit: 1.05", "fix_scale_rate: 0.1"},
       {"fix_correlation_time: 2.0", "{}"},
+      {"fix_scale_lag: 0.0", "fix_scale_rate: 0.1"},
+      {"yaw_rate_scale_sigma: 0.02", "{}"},
+      {"velocity_scale_rate: 0.1", "{}"},
+      {"velocity_scale_limit: 1.05", "{}"},
+      {"velocity_dof: 5.0", "{}"},
+      {"estimate: mean", kOftenBiased},
+      {"cluster_cell: 20.0", kOftenBiased},
   };
+  // Those of the other modes, of a parked robot, and of the covariance alone.
+  EXPECT_EQ(changes.size() + 13, parameter_names(ParticleFilterParameters{}).size());
   SwitchingDrive d;
   d.bias = bias_between(10.0, 20.0, {4.0, 3.0});
   d.duration_s = 30.0;
   const auto last = [&](const ParticleFilterParameters& p) {
     SwitchingParticleFilter filter(p, {});
-    return drive(filter, d).back().estimate.pose;
+    drive(filter, d);
+    VelocityMeasurement velocity;
+    velocity.antenna_velocity_in_body = {1.5, 0.0};
+    velocity.covariance = isotropic(0.1);
+    for (int k = 0; k < 10; ++k) {
+      velocity.velocity = {1.5 + 0.05 * k, -0.3};
+      filter.correct_velocity(velocity);
+    }
+    const double x = filter.pose().x;
+    see_two_places(filter);
+    return Pose2{x, filter.pose().x, filter.pose().y};
   };
   for (const auto& [change, base] : changes) {
-    const ParticleFilterParameters before = with(switching("particle_count: 300"), base);
+    const ParticleFilterParameters before = with(switching(), base);
     EXPECT_FALSE(last(with(before, change)) == last(before)) << change;
   }
 }

@@ -2,41 +2,12 @@
 
 #include <Eigen/Core>
 #include <array>
-#include <optional>
 
-#include "urban_gnss_localization/filters/bias_modes.hpp"
-#include "urban_gnss_localization/filters/dead_reckoning.hpp"
-#include "urban_gnss_localization/filters/fix_noise_model.hpp"
-#include "urban_gnss_localization/filters/localizer.hpp"
-#include "urban_gnss_localization/filters/velocity_noise.hpp"
+#include "urban_gnss_localization/filters/bias_ekf.hpp"
 
 namespace urban_gnss {
 
-struct ImmEkfParameters {
-  FixSigmaParameters fix;
-  FixNoiseModelParameters noise;
-  VelocityNoiseParameters velocity;
-  BiasModeParameters modes;
-  OdometryErrorParameters odometry;
-  double yaw_rate_scale_sigma{0.005};  ///< standard deviation of the odometry's relative yaw-rate error, a constant
-  double fix_scale_lag{15.0};          ///< s apart at which fixes are compared with the odometry between them; 0: never
-  /// m per axis, of the error that fixes share for long (orbits, atmosphere), as far as they declare as much. No filter
-  /// sees it: it is added to the covariance of the estimate
-  double common_error_sigma{0.7};
-
-  template <class V>
-  void visit(V& v) {
-    fix.visit(v);
-    noise.visit(v);
-    velocity.visit(v);
-    modes.visit(v);
-    odometry.visit(v);
-    v("yaw_rate_scale_sigma", yaw_rate_scale_sigma, non_negative());
-    v("fix_scale_lag", fix_scale_lag, non_negative());
-    v("common_error_sigma", common_error_sigma, non_negative());
-  }
-  void check(std::vector<std::string>&) const {}
-};
+using ImmEkfParameters = SwitchingModelParameters;
 
 /// The switching bias as an interacting multiple model (Blom and Bar-Shalom 1988): one extended Kalman filter for each
 /// mode of a fix, mixed by matching moments at each fix.
@@ -50,16 +21,7 @@ struct ImmEkfParameters {
 /// Input that is not finite changes nothing.
 class ImmEkf : public Localizer {
  public:
-  static constexpr int kMotionStates = kErrorStates + 1;
-  static constexpr int kDimension = kMotionStates + 2;
-  using State = Eigen::Matrix<double, kDimension, 1>;
-  using Covariance = Eigen::Matrix<double, kDimension, kDimension>;
-
-  /// A Gaussian of the state; the yaw is in [-pi, pi).
-  struct Gaussian {
-    State mean{State::Zero()};
-    Covariance covariance{Covariance::Zero()};
-  };
+  using Gaussian = BiasGaussian;
 
   /// Requires parameters without faults.
   ImmEkf(const ImmEkfParameters& parameters, const MotionParameters& motion);
@@ -90,31 +52,15 @@ class ImmEkf : public Localizer {
   Gaussian mixture() const;
 
  private:
-  /// A mode at this fix.
-  struct Continuation {
-    double prior{0.0};
-    Gaussian state;
-    double log_weight{0.0};  ///< of the fix, without the prior
-  };
   Gaussian mixed_into(BiasMode to, const ModeTransition& transition, double elapsed_s) const;
-  /// Lets the noise model see the fix beside the odometry alone; `before` is the mixture before the fix.
-  void compare_with_odometry(const FixMeasurement& fix, const Gaussian& before);
-  /// Takes the fix; returns its NIS. `outlier` becomes the posterior probability that it is one.
-  double update(BiasMode mode, const FixMeasurement& fix, Continuation& continuation, double& outlier,
-                double& white_nis) const;
 
   ImmEkfParameters parameters_;
   MotionParameters motion_;
   double nis_threshold_;
-  FixNoiseModel noise_;
-  LearntScale velocity_scale_;
+  ReceiverModel receiver_;
   std::array<Gaussian, kLastingModes> filters_;
   ModeProbabilities probability_{ModeProbabilities::Zero()};
   double bias_odds_{1.0};
-  std::optional<double> last_fix_s_;
-  double moved_s_{0.0};                                   ///< of odometry since the start
-  Eigen::Vector2d corrections_{Eigen::Vector2d::Zero()};  ///< m, what fixes have moved the position by since the start
-  double common_variance_m2_{0.0};
 };
 
 }  // namespace urban_gnss

@@ -2,9 +2,9 @@
 
 #include <cstdint>
 
-#include "urban_gnss_localization/filters/bias_modes.hpp"
+#include "urban_gnss_localization/filters/bias_ekf.hpp"
+#include "urban_gnss_localization/filters/estimation.hpp"
 #include "urban_gnss_localization/filters/fix_likelihood.hpp"
-#include "urban_gnss_localization/filters/fix_noise_model.hpp"
 #include "urban_gnss_localization/filters/particle_localizer.hpp"
 #include "urban_gnss_localization/filters/resampling.hpp"
 #include "urban_gnss_localization/filters/sampling.hpp"
@@ -33,7 +33,6 @@ struct ParticleFilterParameters {
   double ring_share{0.05};                               ///< share of particles drawn on the ring, eq. (22)
   LikelihoodChoice likelihood{LikelihoodChoice::kAuto};  ///< auto: printed (literal, conventional) or product (paper)
   Switch use_gps_heading{Switch::kAuto};  ///< theta_GPS, eq. (12); auto: with the sums, not with the product
-  FixSigmaParameters fix;                 ///< sigma_b, sigma_s
   double gps_heading_sigma{0.1};          ///< rad, sigma_p
   double ess_threshold{5.0};              ///< resampling below this effective sample size, eq. (39)
   ResamplingScheme resampling{ResamplingScheme::kMultinomial};
@@ -42,9 +41,9 @@ struct ParticleFilterParameters {
   double gate_probability{0.99};  ///< conventional mode: gate on the NIS; 1 switches it off
   double gate_timeout{5.0};       ///< s of nothing but rejections after which it restarts on the fix
   int seed{1};
-  FixNoiseModelParameters noise;     ///< of the mode switching
-  BiasModeParameters modes;          ///< of the mode switching
-  OdometryErrorParameters odometry;  ///< of the mode switching
+  int max_particles{100};          ///< of the mode switching, whose number adapts itself
+  double merge_distance{0.5};      ///< of the mode switching: particles nearer than this become one; large: imm_ekf
+  SwitchingModelParameters model;  ///< of the mode switching; its sigma_b, sigma_s are those of all
 
   template <class V>
   void visit(V& v) {
@@ -53,7 +52,6 @@ struct ParticleFilterParameters {
     v("ring_share", ring_share, between(0.0, 1.0));
     v("likelihood", likelihood);
     v("use_gps_heading", use_gps_heading);
-    fix.visit(v);
     v("gps_heading_sigma", gps_heading_sigma, positive());
     v("ess_threshold", ess_threshold, non_negative());
     v("resampling", resampling);
@@ -62,9 +60,9 @@ struct ParticleFilterParameters {
     v("gate_probability", gate_probability, Range{0.0, 1.0, true});
     v("gate_timeout", gate_timeout, positive());
     v("seed", seed, any_number());
-    noise.visit(v);
-    modes.visit(v);
-    odometry.visit(v);
+    v("max_particles", max_particles, between(1, 10000));
+    v("merge_distance", merge_distance, non_negative());
+    model.visit(v);
   }
   void check(std::vector<std::string>& faults) const;
 
@@ -85,6 +83,9 @@ class ParticleFilter : public ParticleLocalizer {
   void initialize(const PoseEstimate& start) override;
   void move(const Twist2& twist, double duration_s) override;
   FixVerdict correct(const FixMeasurement& fix) override;
+  /// The covariance is that of all particles about the pose, other clusters included.
+  PoseEstimate estimate() const override { return {estimate_, covariance_about(particles_, estimate_)}; }
+  LocalizerHealth health() const override;
 
  private:
   FixLikelihood likelihood_of(const FixMeasurement& fix) const;
@@ -96,6 +97,7 @@ class ParticleFilter : public ParticleLocalizer {
   MotionParameters motion_;
   double nis_threshold_;
   RandomEngine engine_;
+  ParticleClusters clusters_;
   RingSampler ring_;
   Resampler resampler_;
 

@@ -20,6 +20,8 @@ struct ParticleSet {
   explicit ParticleSet(std::size_t count = 0);
 
   std::size_t size() const { return x.size(); }
+  /// The numbers of added particles, and the weights of all, are then to be set.
+  void resize(std::size_t count);
   Pose2 pose(std::size_t i) const { return {x[i], y[i], yaw[i]}; }
 
   /// Draws every particle from the Gaussian about `start`, with equal weights. A yaw variance of pi^2/3 or more means
