@@ -120,17 +120,17 @@ TEST(ImmEkfVelocity, IsTheKalmanUpdateOfItsMeasurement) {
   drive(imm, {});
   const ImmEkf::Gaussian before = imm.given(BiasMode::kDirect);
   const Eigen::Vector2d in_body(4.0, -0.7);
-  const auto measure = [&](const ImmEkf::State& state) {
+  const auto measure = [&](const BiasEkfState& state) {
     const double yaw = state[2];
     const double factor = 1.0 + state[3];
     return Eigen::Vector2d(factor * (in_body.x() * std::cos(yaw) - in_body.y() * std::sin(yaw)),
                            factor * (in_body.x() * std::sin(yaw) + in_body.y() * std::cos(yaw)));
   };
-  Eigen::Matrix<double, 2, ImmEkf::kDimension> h;
+  Eigen::Matrix<double, 2, kBiasStates> h;
   constexpr double kStep = 1e-5;
-  for (int i = 0; i < ImmEkf::kDimension; ++i) {
-    ImmEkf::State up = before.mean;
-    ImmEkf::State down = before.mean;
+  for (int i = 0; i < kBiasStates; ++i) {
+    BiasEkfState up = before.mean;
+    BiasEkfState down = before.mean;
     up[i] += kStep;
     down[i] -= kStep;
     h.col(i) = (measure(up) - measure(down)) / (2.0 * kStep);
@@ -140,9 +140,9 @@ TEST(ImmEkfVelocity, IsTheKalmanUpdateOfItsMeasurement) {
   velocity.velocity = measure(before.mean) + Eigen::Vector2d(0.05, -0.03);
   velocity.covariance << 0.01, 0.004, 0.004, 0.02;
   const Eigen::Matrix2d s = h * before.covariance * h.transpose() + velocity.covariance;
-  const Eigen::Matrix<double, ImmEkf::kDimension, 2> gain = before.covariance * h.transpose() * s.inverse();
-  const ImmEkf::State mean = before.mean + gain * Eigen::Vector2d(0.05, -0.03);
-  const ImmEkf::Covariance covariance = before.covariance - gain * s * gain.transpose();
+  const Eigen::Matrix<double, kBiasStates, 2> gain = before.covariance * h.transpose() * s.inverse();
+  const BiasEkfState mean = before.mean + gain * Eigen::Vector2d(0.05, -0.03);
+  const BiasEkfCovariance covariance = before.covariance - gain * s * gain.transpose();
   imm.correct_velocity(velocity);
   const ImmEkf::Gaussian after = imm.given(BiasMode::kDirect);
   EXPECT_GT((after.mean - before.mean).norm(), 1e-4);
