@@ -1,7 +1,6 @@
 // What the pipeline makes of the receiver's velocity and the IMU's yaw rate.
 
 #include "pipeline_rig.hpp"
-#include "urban_gnss_localization/filters/imm_ekf.hpp"
 
 namespace urban_gnss {
 namespace {
@@ -149,10 +148,30 @@ TEST(LocalizationMotion, VelocitiesTellTheHeadingWithinSeconds) {
   EXPECT_GT(start_time(false, without_error), 10.0);
 }
 
-const char* const kWithImu = "{datum: [33.0, 130.0, 20.0], initial_pose: [0.0, 0.0, 0.0]}";
+TEST(LocalizationMotion, ImuYawRateReplacesTheOdometrys) {
+  for (const bool use : {false, true}) {
+    Rig rig(std::string("{datum: [33.0, 130.0, 20.0], initial_pose: [0.0, 0.0, 0.0], use_imu_yaw_rate: ") +
+            (use ? "true}" : "false}"));
+    rig.drive(0.0);
+    rig.pipeline.add_imu_yaw_rate(Rig::at(0.0), 99.0);  // belongs to the step before; and absurd
+    rig.pipeline.add_imu_yaw_rate(Rig::at(0.02), 0.4);
+    rig.pipeline.add_imu_yaw_rate(Rig::at(0.06), 0.6);
+    rig.pipeline.add_imu_yaw_rate(Rig::at(0.12), 5.0);  // belongs to the step after
+    rig.drive(0.1);
+    EXPECT_NEAR(rig.fake->moves[0].first.yaw_rate_radps, use ? 0.5 : 0.1, 1e-12);
+    EXPECT_EQ(rig.fake->moves[0].first.speed_mps, 2.0);
+    rig.drive(0.2);
+    EXPECT_NEAR(rig.fake->moves[1].first.yaw_rate_radps, use ? 5.0 : 0.1, 1e-12);
+    rig.drive(0.3);  // none came: a moment before is near enough
+    EXPECT_NEAR(rig.fake->moves[2].first.yaw_rate_radps, use ? 5.0 : 0.1, 1e-12);
+    rig.drive(0.4);  // and now too long ago
+    rig.drive(0.5);
+    EXPECT_NEAR(rig.fake->moves[4].first.yaw_rate_radps, 0.1, 1e-12);
+  }
+}
 
 TEST(LocalizationMotion, SilentImuFallsBackToTheOdometryAndIsSaidOnce) {
-  Rig rig(kWithImu);
+  Rig rig(kGiven);
   int warnings = 0;
   int infos = 0;
   for (int k = 0; k <= 200; ++k) {
@@ -171,7 +190,7 @@ TEST(LocalizationMotion, SilentImuFallsBackToTheOdometryAndIsSaidOnce) {
 }
 
 TEST(LocalizationMotion, ImuThatIsSlowerThanTheOdometryIsOneSource) {
-  Rig rig(kWithImu);
+  Rig rig(kGiven);
   for (int k = 0; k <= 100; ++k) {
     if (k % 5 == 0) rig.pipeline.add_imu_yaw_rate(Rig::at(0.02 * k), 0.3);  // 10 Hz beside 50 Hz
     rig.drive(0.02 * k);
@@ -180,7 +199,7 @@ TEST(LocalizationMotion, ImuThatIsSlowerThanTheOdometryIsOneSource) {
 }
 
 TEST(LocalizationMotion, YawRateFromTheFutureIsLeftOut) {
-  Rig rig(kWithImu);
+  Rig rig(kGiven);
   rig.drive(0.0);
   rig.pipeline.add_imu_yaw_rate(Rig::at(3600.0), 0.3);
   EXPECT_TRUE(has_event(rig.pipeline, Level::kWarn, "yaw rate of the IMU left out"));
@@ -191,7 +210,7 @@ TEST(LocalizationMotion, YawRateFromTheFutureIsLeftOut) {
 
 TEST(LocalizationMotion, ImuThatContradictsTheOdometryIsSaidOnce) {
   for (const auto& [factor, warnings] : {std::pair{1.0, 0}, {-1.0, 1}, {57.3, 1}, {0.4, 0}}) {
-    Rig rig(kWithImu);
+    Rig rig(kGiven);
     int count = 0;
     for (int k = 0; k <= 2000; ++k) {
       rig.pipeline.add_imu_yaw_rate(Rig::at(0.1 * k), factor * Rig::kTwist.yaw_rate_radps);

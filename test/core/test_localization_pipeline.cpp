@@ -279,28 +279,6 @@ TEST(LocalizationPipeline, TracksWithTheInteractingModels) {
   EXPECT_EQ(rig.state(), LocalizationState::kTracking);
 }
 
-TEST(LocalizationPipeline, ImuYawRateReplacesTheOdometrys) {
-  for (const bool use : {false, true}) {
-    Rig rig(std::string("{datum: [33.0, 130.0, 20.0], initial_pose: [0.0, 0.0, 0.0], use_imu_yaw_rate: ") +
-            (use ? "true}" : "false}"));
-    rig.drive(0.0);
-    rig.pipeline.add_imu_yaw_rate(Rig::at(0.0), 99.0);  // belongs to the step before; and absurd
-    rig.pipeline.add_imu_yaw_rate(Rig::at(0.02), 0.4);
-    rig.pipeline.add_imu_yaw_rate(Rig::at(0.06), 0.6);
-    rig.pipeline.add_imu_yaw_rate(Rig::at(0.12), 5.0);  // belongs to the step after
-    rig.drive(0.1);
-    EXPECT_NEAR(rig.fake->moves[0].first.yaw_rate_radps, use ? 0.5 : 0.1, 1e-12);
-    EXPECT_EQ(rig.fake->moves[0].first.speed_mps, 2.0);
-    rig.drive(0.2);
-    EXPECT_NEAR(rig.fake->moves[1].first.yaw_rate_radps, use ? 5.0 : 0.1, 1e-12);
-    rig.drive(0.3);  // none came: a moment before is near enough
-    EXPECT_NEAR(rig.fake->moves[2].first.yaw_rate_radps, use ? 5.0 : 0.1, 1e-12);
-    rig.drive(0.4);  // and now too long ago
-    rig.drive(0.5);
-    EXPECT_NEAR(rig.fake->moves[4].first.yaw_rate_radps, 0.1, 1e-12);
-  }
-}
-
 /// What users see of half a minute in which everything happens that a parameter is about.
 std::string trace(const std::string& base, const std::string& change, bool wants_bias = false) {
   LocalizationParameters parameters = with(with(LocalizationParameters{}, base), change);

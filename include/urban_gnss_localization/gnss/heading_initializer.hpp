@@ -51,8 +51,9 @@ struct VelocityPair {
 /// 4. The yaw's information (1 / rad²) is the sum of these weights times squared lever arms about the centroid (fixes)
 ///    and times squared speeds (velocities); the centroid's variance is 1 / the sum of the fixes' weights.
 ///
-/// The errors of fixes are taken as independent, those of velocities as a Markov process of 1 s. A bias that the fixes share is not seen; it stays in the position and is not in
-/// the covariance. The odometry's heading is taken to be right within the window.
+/// The errors of fixes are taken as independent, those of velocities as a Markov process of 1 s: a reflection stays for
+/// some of them. A bias that the fixes share is not seen; it stays in the position and is not in the covariance. The
+/// odometry's heading is taken to be right within the window.
 class HeadingInitializer {
  public:
   /// Requires parameters without faults.
