@@ -30,7 +30,7 @@ class MixtureReducer {
  public:
   static constexpr double kNegligible = 1e-4;
   /// rad: headings farther apart are never merged, as no extended Kalman filter is good for both.
-  static constexpr double kSameHeading = 0.2;
+  static constexpr double kSameHeading = 0.1;
 
   /// For up to `most_before` hypotheses.
   explicit MixtureReducer(std::size_t most_before);
