@@ -67,6 +67,7 @@ class LocalizerNode {
  private:
   void on_odometry(const nav_msgs::Odometry& message);
   void on_fix(const sensor_msgs::NavSatFix& message);
+  /// Of either type; roscpp keeps to that of the first message.
   void on_velocity(const topic_tools::ShapeShifter& message);
   void on_imu(const sensor_msgs::Imu& message);
   void on_bias(const urban_gnss_localization::GpsBias& message);
