@@ -67,14 +67,44 @@ void BM_PaperStep(benchmark::State& state) {
 }
 BENCHMARK(BM_PaperStep)->Arg(1000)->Arg(10000)->Unit(benchmark::kMicrosecond);
 
-/// As many particles as are plausible, or (0) all that there may be, as none are merged.
+/// With as many particles as are plausible.
 void BM_SwitchingStep(benchmark::State& state) {
   ParticleFilterParameters parameters;
   parameters.mode = ParticleFilterMode::kSwitching;
-  if (state.range(0) == 0) parameters.merge_distance = 0.0;
   run_steps(state, parameters);
 }
-BENCHMARK(BM_SwitchingStep)->Arg(1)->Arg(0)->Unit(benchmark::kMicrosecond);
+BENCHMARK(BM_SwitchingStep)->Unit(benchmark::kMicrosecond);
+
+/// The switching filter with all the particles that it may have: a heading that is not known.
+std::unique_ptr<ParticleLocalizer> all_headings(PoseEstimate& start) {
+  ParticleFilterParameters parameters;
+  parameters.mode = ParticleFilterMode::kSwitching;
+  start.covariance = Eigen::Vector3d(1.0, 1.0, 4.0).asDiagonal();
+  auto filter = make_particle_filter(parameters, paper_motion());
+  filter->initialize(start);
+  return filter;
+}
+
+void BM_SwitchingMoveAll(benchmark::State& state) {
+  PoseEstimate start;
+  const auto filter = all_headings(start);
+  for (auto _ : state) filter->move(kTwist, kStep_s);
+  state.counters["particles"] = static_cast<double>(filter->particles().size());
+}
+BENCHMARK(BM_SwitchingMoveAll)->Unit(benchmark::kMicrosecond);
+
+/// The start and the first fix.
+void BM_SwitchingCorrectAll(benchmark::State& state) {
+  PoseEstimate start;
+  const auto filter = all_headings(start);
+  FixMeasurement fix;
+  for (auto _ : state) {
+    filter->initialize(start);
+    filter->move(kTwist, 1.0);
+    benchmark::DoNotOptimize(filter->correct(fix));
+  }
+}
+BENCHMARK(BM_SwitchingCorrectAll)->Unit(benchmark::kMicrosecond);
 
 void BM_SampleMotion(benchmark::State& state) {
   ParticleSet particles = cloud(static_cast<std::size_t>(state.range(0)));

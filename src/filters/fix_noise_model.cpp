@@ -4,25 +4,23 @@
 #include <algorithm>
 #include <cmath>
 
+#include "urban_gnss_localization/gnss/correlated_errors.hpp"
+
 namespace urban_gnss {
 namespace {
 
 /// Slower than this on average since the last fix, the robot stands.
 constexpr double kParked_mps = 0.05;
-constexpr double kMostInflation = 1e6;
 /// Weight of a fix in the mean of what fixes declare.
 constexpr double kMeanRate = 0.03;
+/// ln of the most by which a declared variance is changed: one that says "worth nothing" is still worth next to
+/// nothing.
+const double kMostTempered = std::log(4.0);
 
 /// ln of the geometric mean of the variances along the ellipse's axes.
 double log_variance(const Eigen::Matrix2d& covariance) { return 0.5 * std::log(covariance.determinant()); }
 
 }  // namespace
-
-double markov_inflation(double interval_s, double correlation_time_s) {
-  if (correlation_time_s <= 0.0) return 1.0;
-  const double ratio = std::max(interval_s, 0.0) / correlation_time_s;
-  return std::min(1.0 / std::tanh(0.5 * ratio), kMostInflation);
-}
 
 void FixNoiseModel::reset() {
   scale_ = fresh_scale();
@@ -43,7 +41,8 @@ Eigen::Matrix2d FixNoiseModel::believed(const Eigen::Matrix2d& declared) {
   const double now = log_variance(declared);
   if (!log_mean_variance_) log_mean_variance_ = now;
   *log_mean_variance_ += kMeanRate * (now - *log_mean_variance_);
-  return std::exp((parameters_.fix_covariance_weight - 1.0) * (now - *log_mean_variance_)) * declared;
+  const double tempered = (1.0 - parameters_.fix_covariance_weight) * (now - *log_mean_variance_);
+  return std::exp(-std::clamp(tempered, -kMostTempered, kMostTempered)) * declared;
 }
 
 double FixNoiseModel::correlation_inflation(double time_s) const {

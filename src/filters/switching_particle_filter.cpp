@@ -51,19 +51,19 @@ void slice_heading(const BiasGaussian& start, std::size_t most, std::vector<Bias
 
 SwitchingParticleFilter::SwitchingParticleFilter(const ParticleFilterParameters& parameters,
                                                  const MotionParameters& motion)
-    : ParticleLocalizer(static_cast<std::size_t>(parameters.max_particles)),
+    : ParticleLocalizer(static_cast<std::size_t>(parameters.max_particles) + 1),
       parameters_(parameters),
       motion_(motion),
       nis_threshold_(chi_squared_quantile(kReportedQuantile, kFixDof)),
       most_(static_cast<std::size_t>(parameters.max_particles)),
       receiver_(parameters.model),
-      reducer_(kContinuations * most_) {
-  hypotheses_.reserve(kContinuations * most_);
-  next_.reserve(kContinuations * most_);
-  updates_.reserve(kContinuations * most_);
-  cluster_.reserve(most_);
-  cluster_mass_.reserve(most_);
-  draws_.reserve(most_);
+      reducer_(kContinuations * (most_ + 1)) {
+  hypotheses_.reserve(kContinuations * (most_ + 1));
+  next_.reserve(kContinuations * (most_ + 1));
+  updates_.reserve(kContinuations * (most_ + 1));
+  cluster_.reserve(most_ + 1);
+  cluster_mass_.reserve(most_ + 1);
+  draws_.reserve(most_ + 1);
   initialize({});
 }
 

@@ -7,8 +7,8 @@
 #include <stdexcept>
 
 #include "urban_gnss_localization/filters/dead_reckoning.hpp"
-#include "urban_gnss_localization/filters/fix_noise_model.hpp"
 #include "urban_gnss_localization/gnss/chi_squared.hpp"
+#include "urban_gnss_localization/gnss/correlated_errors.hpp"
 
 namespace urban_gnss {
 namespace {

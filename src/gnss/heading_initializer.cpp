@@ -6,7 +6,7 @@
 #include <sstream>
 #include <stdexcept>
 
-#include "urban_gnss_localization/filters/fix_noise_model.hpp"
+#include "urban_gnss_localization/gnss/correlated_errors.hpp"
 
 namespace urban_gnss {
 namespace {

@@ -55,12 +55,14 @@ TEST(FixNoiseModel, BelievesDeclaredUpsAndDownsByItsWeight) {
   for (const double weight : {0.0, 0.5, 1.0}) {
     FixNoiseModel model(make("fix_covariance_weight: " + std::to_string(weight)));
     for (int k = 0; k < 50; ++k) EXPECT_NEAR((model.believed(usual) - usual).norm(), 0.0, 1e-9);
-    // A fix that declares a hundredfold moves the mean a little itself; the ellipse keeps its shape.
-    const Eigen::Matrix2d raised = model.believed(100.0 * usual);
-    const double expected = std::pow(100.0, weight + (1.0 - weight) * 0.03);
+    // A fix that declares three times that moves the mean a little itself; the ellipse keeps its shape.
+    const Eigen::Matrix2d raised = model.believed(3.0 * usual);
+    const double expected = std::pow(3.0, weight + (1.0 - weight) * 0.03);
     EXPECT_NEAR((raised - expected * usual).norm() / raised.norm(), 0.0, 1e-9) << weight;
+    // One that is worth nothing stays worth next to nothing.
+    EXPECT_GT(model.believed(1e6 * usual).trace(), 0.24e6 * usual.trace()) << weight;
     model.reset();
-    EXPECT_NEAR((model.believed(100.0 * usual) - 100.0 * usual).norm(), 0.0, 1e-9);
+    EXPECT_NEAR((model.believed(3.0 * usual) - 3.0 * usual).norm(), 0.0, 1e-9);
   }
 }
 

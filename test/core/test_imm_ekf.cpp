@@ -327,10 +327,11 @@ TEST(ImmEkf, EveryParameterHasAnEffectF36) {
       {"fix_correlation_time: 2.0", "{}"},
       {"fix_scale_limit: 1.05", "fix_scale_rate: 0.1"},
       {"fix_scale_lag: 0.0", "fix_scale_rate: 0.1"},
+      {"first_fix_scale: 3.0", "fix_scale_rate: 0.1"},
       {"yaw_rate_scale_sigma: 0.02", "{}"},
   };
-  // Elsewhere: those of a parked robot, common_error_sigma, the velocity's.
-  EXPECT_EQ(changes.size() + 3 + parameter_names(VelocityNoiseParameters{}).size(),
+  // Elsewhere: those of a parked robot, common_error_sigma, fix_covariance_weight, the velocity's.
+  EXPECT_EQ(changes.size() + 4 + parameter_names(VelocityNoiseParameters{}).size(),
             parameter_names(ImmEkfParameters{}).size());
   SwitchingDrive d;
   d.bias = bias_between(20.0, 40.0, {4.0, 3.0});

@@ -292,6 +292,7 @@ TEST(SwitchingParticleFilter, EveryParameterHasAnEffectF36) {
       {"fix_scale_limit: 1.05", "fix_scale_rate: 0.1"},
       {"fix_correlation_time: 2.0", "{}"},
       {"fix_scale_lag: 0.0", "fix_scale_rate: 0.1"},
+      {"first_fix_scale: 3.0", "fix_scale_rate: 0.1"},
       {"yaw_rate_scale_sigma: 0.02", "{}"},
       {"velocity_scale_rate: 0.1", "{}"},
       {"velocity_scale_limit: 1.05", "{}"},
@@ -299,8 +300,8 @@ TEST(SwitchingParticleFilter, EveryParameterHasAnEffectF36) {
       {"estimate: mean", kOftenBiased},
       {"cluster_cell: 20.0", kOftenBiased},
   };
-  // Those of the other modes, of a parked robot, and of the covariance alone.
-  EXPECT_EQ(changes.size() + 13, parameter_names(ParticleFilterParameters{}).size());
+  // Those of the other modes, of a parked robot, of changing declarations, and of the covariance alone.
+  EXPECT_EQ(changes.size() + 14, parameter_names(ParticleFilterParameters{}).size());
   SwitchingDrive d;
   d.bias = bias_between(10.0, 20.0, {4.0, 3.0});
   d.duration_s = 30.0;

@@ -43,11 +43,6 @@ struct DeadReckonedFix {
   double time_s{0.0};
 };
 
-/// Factor, 1 to 10^6, on the covariance of a fix `interval_s` after the last one, whose error is a first-order Markov
-/// process: with it, fixes are together worth as much as independent ones, (1 + a) / (1 - a), a = exp(-interval /
-/// correlation time). 1 where correlation_time_s is not positive.
-double markov_inflation(double interval_s, double correlation_time_s);
-
 /// What a fix is worth: the covariance that its receiver declares follows its errors up and down, but is too small
 /// or too large by a factor, which is learnt (LearntScale), and errors are correlated in time.
 ///
@@ -68,7 +63,8 @@ class FixNoiseModel {
 
   double scale() const { return lagged_scale_ ? std::max(scale_.value(), lagged_scale_->value()) : scale_.value(); }
   /// The next fix declares `declared` (m^2, positive definite): as far as its ups and downs are believed. Its size is
-  /// drawn towards the geometric mean of those declared lately, by the power 1 - fix_covariance_weight.
+  /// drawn towards the geometric mean of those declared lately, by the power 1 - fix_covariance_weight, at most by a
+  /// factor of 4.
   Eigen::Matrix2d believed(const Eigen::Matrix2d& declared);
   /// Factor on the covariance of a fix at `time_s` by which correlation lowers its worth, at least 1.
   double correlation_inflation(double time_s) const;

@@ -56,13 +56,14 @@ class SwitchingParticleFilter : public ParticleLocalizer {
   ModeProbabilities mode_probabilities() const;
 
  private:
-  /// Fills next_ with all that may have happened up to the fix; false where nothing is finite. Returns what they
-  /// together say of the fix.
+  /// What all that may have happened says of a fix together.
   struct Opinion {
-    double outlier{0.0};
+    double outlier{0.0};    ///< probability that it is one
     double exceeding{0.0};  ///< share of the NIS beyond the median
   };
+  /// Fills next_ with all that may have happened up to the fix; false where nothing of it is finite.
   bool continue_all(const FixMeasurement& fix, Opinion& opinion);
+  /// Of the particles as they stand, with their weights; and update_estimate().
   void find_clusters();
   /// Pose and cloud of the particles as they stand.
   void update_estimate();
