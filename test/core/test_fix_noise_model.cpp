@@ -111,7 +111,8 @@ double followed_scale(double sigma, double correlation_s, double lag_s, double d
 }
 
 TEST(FixNoiseModel, FixesFartherApartThanTheReceiverSmoothsTellTheirErrors) {
-  const double least = 1.0 / (20.0 * 20.0);
+  const double limit = FixNoiseModelParameters{}.fix_scale_limit;
+  const double least = 1.0 / (limit * limit);
   EXPECT_NEAR(followed_scale(2.0, 5.0, 0.0, 0.0, 0.0), least, 0.1 * least);  // nothing to stop it
   for (const double sigma : {0.3, 1.0, 3.0}) {
     EXPECT_NEAR(followed_scale(sigma, 5.0, 30.0, 0.0, 0.0) / (sigma * sigma), 1.0, 0.15) << sigma;
