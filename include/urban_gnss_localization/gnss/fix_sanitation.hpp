@@ -14,7 +14,7 @@ namespace urban_gnss {
 /// What is believed of a receiver's own covariance, and how far from the datum a fix may lie.
 struct FixSanitationParameters {
   /// m, standard deviation per horizontal axis where a fix declares no covariance that can be used
-  double fix_sigma_default{2.5};
+  double fix_sigma_default{4.0};
   /// m, smallest standard deviation that is believed; receivers declare millimetres, or degrees squared
   double fix_sigma_floor{0.3};
   /// m, largest standard deviation that is kept; beyond it a fix says nothing
