@@ -26,6 +26,7 @@ std::vector<SatelliteObservation> to_observations(const std::vector<SatelliteRep
     observation.look = report.look;
     observation.cn0_dbhz = report.cn0_dbhz;
     observation.tracked = report.is_tracked;
+    observation.residual_m = report.residual_m;
     observations.push_back(observation);
   }
   return observations;

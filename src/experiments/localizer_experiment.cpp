@@ -45,6 +45,7 @@ class Participant : public DriveParticipant {
 
   void add_epoch(const DriveEpoch& epoch, const Pose2& base_in_odom) override {
     if (occlusion_) occlusion_->set_satellites(epoch.stamp, epoch.satellites, epoch.angle_resolution_rad);
+    localization_.add_satellites(epoch.stamp, epoch.satellites);
     if (!epoch.fix) return;
     RawFix fix;
     fix.stamp = epoch.stamp;

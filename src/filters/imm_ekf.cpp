@@ -39,7 +39,6 @@ void ImmEkf::initialize(const PoseEstimate& start) {
   if (!start.covariance.allFinite()) throw std::invalid_argument("imm_ekf: the covariance to start from is not finite");
   filters_.fill(start_gaussian(start, parameters_));
   probability_ << 1.0, 0.0, 0.0;
-  bias_odds_ = 1.0;
   receiver_.reset();
 }
 
@@ -71,11 +70,11 @@ FixVerdict ImmEkf::correct(const FixMeasurement& declared) {
     verdict.reason = "position, time or covariance cannot be used";
     return verdict;
   }
-  const FixMeasurement fix = receiver_.believed(declared);
   const Gaussian before = mixture();
+  const FixMeasurement fix = receiver_.believed(declared, before);
   const double elapsed_s = receiver_.elapsed_s(fix.time_s);
   const FixNoise noise = receiver_.fix_noise(fix.time_s);
-  const ModeTransition transition = mode_transition(elapsed_s, parameters_.modes, bias_odds_);
+  const ModeTransition transition = mode_transition(elapsed_s, parameters_.modes, receiver_.bias_odds());
   const Eigen::Vector4d prior = transition.transpose() * probability_;
   std::array<Gaussian, kContinuations> next;
   std::array<BiasEkfUpdate, kContinuations> updates;

@@ -73,7 +73,6 @@ void SwitchingParticleFilter::initialize(const PoseEstimate& start) {
   }
   engine_ = make_engine(static_cast<std::uint64_t>(parameters_.seed));
   slice_heading(start_gaussian(start, parameters_.model), most_, hypotheses_);
-  bias_odds_ = 1.0;
   receiver_.reset();
   draw_cloud();
   find_clusters();
@@ -90,7 +89,7 @@ void SwitchingParticleFilter::move(const Twist2& twist, double duration_s) {
 bool SwitchingParticleFilter::continue_all(const FixMeasurement& fix, Opinion& opinion) {
   const double elapsed_s = receiver_.elapsed_s(fix.time_s);
   const FixNoise noise = receiver_.fix_noise(fix.time_s);
-  const ModeTransition transition = mode_transition(elapsed_s, parameters_.model.modes, bias_odds_);
+  const ModeTransition transition = mode_transition(elapsed_s, parameters_.model.modes, receiver_.bias_odds());
   next_.clear();
   for (const BiasHypothesis& before : hypotheses_) {
     for (const BiasMode to : kModes) {
@@ -128,8 +127,8 @@ FixVerdict SwitchingParticleFilter::correct(const FixMeasurement& declared) {
     verdict.reason = "position, time or covariance cannot be used";
     return verdict;
   }
-  const FixMeasurement fix = receiver_.believed(declared);
   const BiasGaussian before = mixture();
+  const FixMeasurement fix = receiver_.believed(declared, before);
   const Eigen::Vector2d innovation = fix.position - transform_point(estimate_, fix.antenna_in_body);
   const Eigen::Matrix2d covariance =
       before.covariance.topLeftCorner<2, 2>() + parameters_.model.fix.direct_covariance(fix.covariance);

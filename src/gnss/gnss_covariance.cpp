@@ -91,11 +91,6 @@ double nlos_scale(double elevation_rad, double hidden_share, const GnssCovarianc
          std::pow(cotangent / kReferenceCotangent, parameters.nlos_elevation_exponent);
 }
 
-int clock_of(const SatelliteId& id) {
-  const bool keeps_gps_time = id.constellation == Constellation::kSbas || id.constellation == Constellation::kQzss;
-  return static_cast<int>(keeps_gps_time ? Constellation::kGps : id.constellation);
-}
-
 Eigen::Matrix2d symmetric(const Eigen::Matrix2d& matrix) { return 0.5 * (matrix + matrix.transpose()); }
 
 /// Eq. (4) or (6); nothing determined is R_inf.
@@ -144,7 +139,7 @@ std::vector<RangingSatellite> ranging(const std::vector<SatelliteObservation>& s
   std::vector<RangingSatellite> result;
   result.reserve(which.size());
   for (const std::size_t i : which) {
-    result.push_back({line_of_sight(satellites[i].look), clock_of(satellites[i].id), 1.0});
+    result.push_back({line_of_sight(satellites[i].look), static_cast<int>(clock_of(satellites[i].id.constellation)), 1.0});
   }
   return result;
 }

@@ -20,6 +20,11 @@ char rinex_letter(Constellation constellation) {
 
 }  // namespace
 
+Constellation clock_of(Constellation constellation) {
+  const bool keeps_gps_time = constellation == Constellation::kSbas || constellation == Constellation::kQzss;
+  return keeps_gps_time ? Constellation::kGps : constellation;
+}
+
 std::string satellite_name(const SatelliteId& id) {
   const std::string number = std::to_string(id.svid);
   return rinex_letter(id.constellation) + (number.size() < 2 ? "0" + number : number);

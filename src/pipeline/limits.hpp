@@ -11,4 +11,9 @@ inline constexpr double kMaxAhead_s = 10.0;
 /// How many fixes, or biases, may wait for what they need; the oldest go first.
 inline constexpr std::size_t kMaxWaitingFixes = 1000;
 
+/// How many epochs of satellites are remembered, for fixes that wait for odometry.
+inline constexpr std::size_t kMaxWaitingSatellites = 100;
+/// Satellites that are no farther from a fix are its own: some drivers round one of the two stamps.
+inline constexpr double kSameEpoch_s = 0.02;
+
 }  // namespace urban_gnss

@@ -10,6 +10,12 @@
 
 namespace urban_gnss {
 
+namespace {
+
+bool is_same_epoch(Stamp a, Stamp b) { return std::abs(to_seconds(a - b)) <= kSameEpoch_s; }
+
+}  // namespace
+
 void LocalizationParameters::check(std::vector<std::string>& faults) const {
   if (!initial_pose.empty() && initial_pose.size() != 3) {
     faults.push_back("initial_pose: has " + std::to_string(initial_pose.size()) +
@@ -55,6 +61,9 @@ void LocalizationPipeline::reset(const std::string& why) {
   pending_velocities_.clear();
   last_fix_stamp_.reset();
   biases_.clear();
+  satellites_.clear();
+  fixes_have_satellites_ = false;
+  last_corrected_.reset();
   last_radius_m_ = 0.0;
   initialized_ = false;
   lost_ = false;
@@ -161,6 +170,21 @@ void LocalizationPipeline::add_bias(const BiasEstimate& bias) {
   process_fixes();
 }
 
+void LocalizationPipeline::add_satellites(Stamp stamp, std::vector<SatelliteObservation> satellites) {
+  if (!takes_satellites()) return;
+  if (last_corrected_ && is_same_epoch(stamp, *last_corrected_)) fixes_have_satellites_ = true;  // they came late
+  satellites_.emplace_back(stamp, std::move(satellites));
+  if (satellites_.size() > kMaxWaitingSatellites) satellites_.pop_front();
+  process_fixes();
+}
+
+const std::vector<SatelliteObservation>* LocalizationPipeline::satellites_of(Stamp stamp) const {
+  // From the back: of two of one stamp, those that came last.
+  const auto found = std::find_if(satellites_.rbegin(), satellites_.rend(),
+                                  [&](const auto& epoch) { return is_same_epoch(epoch.first, stamp); });
+  return found != satellites_.rend() ? &found->second : nullptr;
+}
+
 std::optional<BiasQuery> LocalizationPipeline::bias_query() const {
   if (!initialized_ || !localizer_->wants_bias() || pending_.empty() || history_.empty()) return std::nullopt;
   const PendingFix& next = pending_.front();
@@ -201,6 +225,10 @@ bool LocalizationPipeline::process_next_fix() {
     initialize_with(next);
     return true;
   }
+  if (fixes_have_satellites_ && !satellites_of(next.fix.stamp) &&
+      to_seconds(history_.latest() - next.fix.stamp) < parameters_.satellites_timeout) {
+    return false;
+  }
   if (localizer_->wants_bias()) {
     while (!biases_.empty() && biases_.front().stamp < next.fix.stamp) biases_.pop_front();
     // Searched for: a bias of before the clock was set back, published late, may stand in front for good.
@@ -236,6 +264,10 @@ void LocalizationPipeline::correct_with(const PendingFix& pending, double radius
   measurement.bias_radius_m = radius_m;
   measurement.time_s = to_seconds(pending.fix.stamp);
   measurement.stamp = pending.fix.stamp;
+  const auto* satellites = satellites_of(pending.fix.stamp);
+  fixes_have_satellites_ = satellites != nullptr;
+  last_corrected_ = pending.fix.stamp;
+  if (satellites) measurement.satellites = *satellites;
   FixVerdict verdict = localizer_->correct(measurement);
   verdict.stamp = pending.fix.stamp;
   verdict.covariance_clamped = pending.sanitation.covariance_clamped;

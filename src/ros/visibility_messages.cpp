@@ -121,6 +121,7 @@ std::vector<SatelliteObservation> to_observations(const msgs::SatelliteArray& me
     observation.look = {satellite.azimuth, satellite.elevation};
     observation.cn0_dbhz = satellite.cn0;
     observation.tracked = satellite.tracked;
+    observation.residual_m = satellite.pseudorange_residual;
     observations.push_back(observation);
   }
   return observations;

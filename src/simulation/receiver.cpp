@@ -84,6 +84,7 @@ ReceiverEpoch Receiver::epoch(double interval_s, const Eigen::Vector3d& antenna,
   fix.velocity_sigma_mps = solution->hdop * parameters_.velocity_sigma;
   fix.velocity = velocity + (fix.velocity_sigma_mps + nlos_share * parameters_.velocity_nlos_sigma) * velocity_noise;
   fix.position = smoothed(interval_s, antenna + solution->position);
+  refer_residuals(measurements, fix.position - antenna - solution->position, result.satellites);
   const double horizontal_m = parameters_.uere * solution->hdop;
   const double vertical_m = parameters_.uere * solution->vdop;
   fix.covariance = Eigen::Array3d(horizontal_m, horizontal_m, vertical_m).square().matrix().asDiagonal();
@@ -133,6 +134,30 @@ std::vector<RangeMeasurement> Receiver::measure(double interval_s, const std::ve
     measured_.push_back(i);
   }
   return measurements;
+}
+
+void Receiver::refer_residuals(const std::vector<RangeMeasurement>& measurements, const Eigen::Vector3d& moved,
+                               std::vector<SatelliteReport>& reports) const {
+  struct ClockFit {
+    double weighted_m{0.0};
+    double weight{0.0};
+  };
+  std::map<Constellation, ClockFit> clocks;
+  for (std::size_t i = 0; i < measurements.size(); ++i) {
+    SatelliteReport& report = reports[measured_[i]];
+    if (!report.is_used) continue;
+    report.residual_m += measurements[i].line_of_sight.dot(moved);
+    const double weight = 1.0 / (measurements[i].sigma_m * measurements[i].sigma_m);
+    ClockFit& clock = clocks[measurements[i].constellation];
+    clock.weighted_m += weight * report.residual_m;
+    clock.weight += weight;
+  }
+  for (std::size_t i = 0; i < measurements.size(); ++i) {
+    SatelliteReport& report = reports[measured_[i]];
+    if (!report.is_used) continue;
+    const ClockFit& clock = clocks.at(measurements[i].constellation);
+    report.residual_m -= clock.weighted_m / clock.weight;
+  }
 }
 
 Receiver::Channel& Receiver::channel_of(const SatelliteId& id) {

@@ -25,9 +25,11 @@
 #include "urban_gnss_localization/ros/conversions.hpp"
 #include "urban_gnss_localization/ros/localizer_node.hpp"
 #include "urban_gnss_localization/ros/topics.hpp"
+#include "urban_gnss_localization/ros/visibility_messages.hpp"
 
 namespace fs = std::filesystem;
 using namespace urban_gnss;
+using urban_gnss_localization::SatelliteArray;
 
 namespace {
 
@@ -43,6 +45,8 @@ struct Options {
   bool wants_imu = false;  ///< imu_topic was asked for
   std::string velocity_topic = topics::kVelocity;
   bool wants_velocity = false;  ///< velocity_topic was asked for
+  std::string satellites_topic = topics::kSatellites;
+  bool wants_satellites = false;  ///< satellites_topic was asked for
   std::string truth_topic = topics::kTruth;
   std::vector<double> datum;
   int seed = -1;
@@ -140,6 +144,10 @@ class Replay {
   }
   void add_fix(const sensor_msgs::NavSatFix& message) {
     pipeline_.add_fix(to_raw_fix(message));
+    settle();
+  }
+  void add_satellites(const SatelliteArray& message) {
+    pipeline_.add_satellites(to_stamp(message.header.stamp), to_observations(message));
     settle();
   }
   void add_velocity(const RawVelocity& velocity) {
@@ -272,8 +280,9 @@ void run(const Options& options) {
   const std::string odom = without_leading_slash(options.odom_topic);
   const std::string imu = without_leading_slash(options.imu_topic);
   const std::string velocity = without_leading_slash(options.velocity_topic);
+  const std::string satellites = without_leading_slash(options.satellites_topic);
   const std::string truth = without_leading_slash(options.truth_topic);
-  const auto messages = ordered_messages(bag, {topics::kDatum, imu, odom, fix, velocity, truth});
+  const auto messages = ordered_messages(bag, {topics::kDatum, imu, odom, fix, velocity, satellites, truth});
   const auto count = [&](const std::string& name) {
     return std::count_if(messages.begin(), messages.end(),
                          [&](const auto& message) { return without_leading_slash(message.getTopic()) == name; });
@@ -291,6 +300,7 @@ void run(const Options& options) {
   require("--odom-topic", odom);
   if (options.wants_imu) require("--imu-topic", imu);
   if (options.wants_velocity) require("--velocity-topic", velocity);
+  if (options.wants_satellites) require("--satellites-topic", satellites);
 
   Replay replay(options, parameters);
   Progress progress(messages.size(), "messages");
@@ -306,6 +316,8 @@ void run(const Options& options) {
       const auto measured = to_raw_velocity_of(message);
       if (!measured) throw wrong_type(message, kVelocityTypes);
       replay.add_velocity(*measured);
+    } else if (name == satellites) {
+      replay.add_satellites(*expect<SatelliteArray>(message));
     } else if (name == imu) {
       replay.add_imu(*expect<sensor_msgs::Imu>(message));
     } else if (name == truth) {
@@ -366,6 +378,9 @@ int main(int argc, char** argv) {
   const auto* imu_topic = app.add_option("--imu-topic", options.imu_topic,
                                          "sensor_msgs/Imu whose yaw rate is used instead of the odometry's, where the "
                                          "bag has it; \"\": none");
+  const auto* satellites_topic = app.add_option("--satellites-topic", options.satellites_topic,
+                                                "urban_gnss_localization/SatelliteArray, whose residuals tell the "
+                                                "ranges of a fix, where the bag has it; \"\": none");
   app.add_option("--truth-topic", options.truth_topic, "nav_msgs/Odometry, for the errors only");
   app.add_option("--datum", options.datum,
                  "LAT,LON,ALT (deg, deg, m); default: the bag's gps/datum, or the first fixes")
@@ -376,6 +391,7 @@ int main(int argc, char** argv) {
   app.add_option("--tum", options.tum_file, "write the trajectory here (TUM format, ENU about the datum)");
   CLI11_PARSE(app, argc, argv);
   options.wants_velocity = velocity_topic->count() > 0 && !options.velocity_topic.empty();
+  options.wants_satellites = satellites_topic->count() > 0 && !options.satellites_topic.empty();
   options.wants_imu = imu_topic->count() > 0 && !options.imu_topic.empty();
   try {
     run(options);

@@ -12,6 +12,7 @@
 #include "urban_gnss_localization/filters/fix_noise_model.hpp"
 #include "urban_gnss_localization/filters/localizer.hpp"
 #include "urban_gnss_localization/filters/velocity_noise.hpp"
+#include "urban_gnss_localization/gnss/range_fix.hpp"
 
 namespace urban_gnss {
 
@@ -19,6 +20,7 @@ namespace urban_gnss {
 struct SwitchingModelParameters {
   FixSigmaParameters fix;
   FixNoiseModelParameters noise;
+  RangeFixParameters ranges;
   VelocityNoiseParameters velocity;
   BiasModeParameters modes;
   OdometryErrorParameters odometry;
@@ -32,6 +34,7 @@ struct SwitchingModelParameters {
   void visit(V& v) {
     fix.visit(v);
     noise.visit(v);
+    ranges.visit(v);
     velocity.visit(v);
     modes.visit(v);
     odometry.visit(v);
@@ -39,7 +42,7 @@ struct SwitchingModelParameters {
     v("fix_scale_lag", fix_scale_lag, non_negative());
     v("common_error_sigma", common_error_sigma, non_negative());
   }
-  void check(std::vector<std::string>&) const {}
+  void check(std::vector<std::string>& faults) const { ranges.check(faults); }
 };
 
 /// Order of the states: pose and odometry errors (kErrorStates), relative error of the yaw rate (1), bias b_x, b_y (m).
@@ -129,9 +132,17 @@ class ReceiverModel {
 
   /// s >= 0 since the last fix; since the start where there was none.
   double elapsed_s(double time_s) const;
-  /// The fix with its covariance as far as it is believed: FixNoiseModel::believed(). Once a fix.
-  FixMeasurement believed(const FixMeasurement& fix);
-  FixNoise fix_noise(double time_s) const { return {noise_.scale(), noise_.correlation_inflation(time_s)}; }
+  /// The fix as far as it is believed: what its ranges say beside the state `before` it (range_fix()) where it has
+  /// them, else with its covariance by FixNoiseModel::believed(). Once a fix, before the others of this class.
+  FixMeasurement believed(const FixMeasurement& fix, const BiasGaussian& before);
+  /// m, of a range in line of sight, as learnt.
+  double range_sigma_m() const;
+  FixNoise fix_noise(double time_s) const {
+    return {of_ranges_ ? 1.0 : noise_.scale(),
+            of_ranges_ ? range_noise_.correlation_inflation(time_s) : noise_.correlation_inflation(time_s)};
+  }
+  /// Prior odds of a bias of the fix, against those of the parameters: bias_odds of mode_transition().
+  double bias_odds() const { return of_ranges_ ? parameters_.ranges.range_bias_odds : 1.0; }
   /// A fix was taken, with a share `exceeding` of its NIS beyond the median.
   void learn_fix(double time_s, double exceeding);
   /// Lets the noise model see the fix beside the odometry alone; `before` and `after` it, all modes together.
@@ -147,6 +158,9 @@ class ReceiverModel {
  private:
   SwitchingModelParameters parameters_;
   FixNoiseModel noise_;
+  FixNoiseModel range_noise_;
+  FreeSignalLevel free_signals_;
+  bool of_ranges_{false};  ///< the last fix
   LearntScale velocity_scale_;
   std::optional<double> last_fix_s_;
   double moved_s_{0.0};                                   ///< of odometry since the start

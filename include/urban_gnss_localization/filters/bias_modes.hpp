@@ -56,7 +56,7 @@ struct BiasModeParameters {
   double jump_sigma{8.0};        ///< m per axis, sigma_J, of a bias that came at once
   double bias_fade_time{20.0};   ///< s, after which a bias is again like one that has just come; 0: it never forgets
   double onset_sigma{0.5};       ///< m per axis, of a bias that begins without a jump
-  double student_dof{2.0};       ///< degrees of freedom of the noise in direct reception; large ones are Gaussian
+  double student_dof{4.0};       ///< degrees of freedom of the noise in direct reception; large ones are Gaussian
   double outlier_share{0.01};    ///< of the fixes, those that say nothing
   double outlier_radius{200.0};  ///< m, within which such a fix is anywhere
 

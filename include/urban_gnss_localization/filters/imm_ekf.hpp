@@ -38,12 +38,10 @@ class ImmEkf : public Localizer {
   bool takes_velocity() const override { return true; }
   /// Leaves out a velocity that cannot be used.
   void correct_velocity(const VelocityMeasurement& velocity) override;
+  bool takes_satellites() const override { return parameters_.ranges.use_ranges; }
   Pose2 pose() const override;
   PoseEstimate estimate() const override;
   LocalizerHealth health() const override;
-
-  /// Prior odds of a bias for the next fixes, against those of the parameters: bias_odds of mode_transition().
-  void set_bias_odds(double odds) { bias_odds_ = odds; }
 
   const ModeProbabilities& mode_probabilities() const { return probability_; }
   /// The state given the mode at the last fix.
@@ -60,7 +58,6 @@ class ImmEkf : public Localizer {
   ReceiverModel receiver_;
   std::array<Gaussian, kLastingModes> filters_;
   ModeProbabilities probability_{ModeProbabilities::Zero()};
-  double bias_odds_{1.0};
 };
 
 }  // namespace urban_gnss

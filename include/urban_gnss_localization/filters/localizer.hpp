@@ -3,10 +3,12 @@
 #include <cstdint>
 #include <limits>
 #include <string>
+#include <vector>
 
 #include "urban_gnss_localization/geometry/pose2.hpp"
 #include "urban_gnss_localization/gnss/fix.hpp"
 #include "urban_gnss_localization/gnss/fix_decision.hpp"
+#include "urban_gnss_localization/gnss/satellite.hpp"
 #include "urban_gnss_localization/motion/motion_model.hpp"
 
 namespace urban_gnss {
@@ -17,9 +19,10 @@ struct FixMeasurement {
   Eigen::Matrix2d covariance{Eigen::Matrix2d::Identity()};  ///< m^2
   /// Where the antenna was at the fix's stamp, seen from the base as it stands now (m): lever arm and lateness in one.
   Eigen::Vector2d antenna_in_body{Eigen::Vector2d::Zero()};
-  double bias_radius_m{0.0};  ///< r-hat, where a bias filter gave one
-  double time_s{0.0};         ///< of the fix, since any fixed instant
-  Stamp stamp{0};             ///< of the fix, for what is published about it
+  double bias_radius_m{0.0};                     ///< r-hat, where a bias filter gave one
+  double time_s{0.0};                            ///< of the fix, since any fixed instant
+  Stamp stamp{0};                                ///< of the fix, for what is published about it
+  std::vector<SatelliteObservation> satellites;  ///< of the fix, where the receiver reports them
 };
 
 /// A receiver's velocity, from the Doppler shift of its signals, at the moment it enters a filter.
@@ -74,6 +77,9 @@ class Localizer {
   virtual bool takes_velocity() const { return false; }
   /// Takes one velocity of the receiver; the methods that know of none leave it out.
   virtual void correct_velocity(const VelocityMeasurement& /*velocity*/) {}
+
+  /// Whether it makes use of the satellites of a fix.
+  virtual bool takes_satellites() const { return false; }
 
   virtual Pose2 pose() const = 0;
   /// The pose with its covariance.

@@ -34,6 +34,7 @@ class SwitchingParticleFilter : public ParticleLocalizer {
   std::string mode() const override { return enum_name(ParticleFilterMode::kSwitching); }
   bool wants_bias() const override { return false; }
   bool takes_velocity() const override { return true; }
+  bool takes_satellites() const override { return parameters_.model.ranges.use_ranges; }
   /// A heading with a variance of pi^2/3 or more is unknown: particles are spread over the circle. Throws
   /// std::invalid_argument where pose or covariance is not finite.
   void initialize(const PoseEstimate& start) override;
@@ -45,9 +46,6 @@ class SwitchingParticleFilter : public ParticleLocalizer {
   void correct_velocity(const VelocityMeasurement& velocity) override;
   PoseEstimate estimate() const override;
   LocalizerHealth health() const override;
-
-  /// Prior odds of a bias for the next fixes, against those of the parameters: bias_odds of mode_transition().
-  void set_bias_odds(double odds) { bias_odds_ = odds; }
 
   const std::vector<BiasHypothesis>& hypotheses() const { return hypotheses_; }
   /// All of them together.
@@ -83,7 +81,6 @@ class SwitchingParticleFilter : public ParticleLocalizer {
   std::vector<double> cluster_mass_;    ///< of each cluster
   std::uint32_t heaviest_{0};           ///< cluster
   std::vector<Eigen::Vector3d> draws_;  ///< of each particle's pose in the cloud, standard normal
-  double bias_odds_{1.0};
 };
 
 /// The particle filter of the mode that the parameters say.

@@ -83,19 +83,7 @@ struct GnssCovarianceParameters {
   void check(std::vector<std::string>& faults) const;
 };
 
-/// What is known of one satellite. Angles may be whole degrees, as many receivers give them.
-struct SatelliteObservation {
-  static constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
-
-  SatelliteId id;
-  LookAngles look;  ///< not finite, or below the horizon: the satellite is left out
-  double cn0_dbhz{kUnknown};
-  bool tracked{true};                 ///< otherwise the satellite is left out
-  double blocked_fraction{kUnknown};  ///< share of rays that the map blocks, 0 to 1; unknown without a map
-  double known_fraction{0.0};         ///< share of rays whose way through the map is known, 0 to 1
-};
-
-/// The same of the sky as a whole, for a receiver that reports no satellites.
+/// What the map blocks of the sky as a whole, for a receiver that reports no satellites.
 struct SkyObservation {
   double blocked_fraction{0.0};
   double known_fraction{0.0};

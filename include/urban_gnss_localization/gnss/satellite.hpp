@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <tuple>
 
@@ -37,6 +38,9 @@ struct SatelliteId {
 /// The name that RINEX gives a satellite ("G05", "E11"); "?07" where the constellation is unknown.
 std::string satellite_name(const SatelliteId& id);
 
+/// The clock of the receiver that a range contains: SBAS and QZSS keep the time of GPS.
+Constellation clock_of(Constellation constellation);
+
 /// Where a satellite stands as seen from the antenna.
 struct LookAngles {
   double azimuth_rad{0.0};    ///< clockwise from true north
@@ -49,5 +53,19 @@ inline Eigen::Vector3d line_of_sight(const LookAngles& look) {
   return {horizontal * std::sin(look.azimuth_rad), horizontal * std::cos(look.azimuth_rad),
           std::sin(look.elevation_rad)};
 }
+
+/// What is known of one satellite. Angles may be whole degrees, as many receivers give them.
+struct SatelliteObservation {
+  static constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+
+  SatelliteId id;
+  LookAngles look;  ///< not finite, or below the horizon: the satellite is left out
+  double cn0_dbhz{kUnknown};
+  bool tracked{true};                 ///< otherwise the satellite is left out
+  double blocked_fraction{kUnknown};  ///< share of rays that the map blocks, 0 to 1; unknown without a map
+  double known_fraction{0.0};         ///< share of rays whose way through the map is known, 0 to 1
+  /// m, of its pseudorange in the receiver's own solution: measured minus expected; unknown where it was not used
+  double residual_m{kUnknown};
+};
 
 }  // namespace urban_gnss

@@ -30,10 +30,11 @@ struct LocalizationParameters {
   /// m, beyond three declared standard deviations: a fix farther from the estimate cannot be explained by reflections
   /// (Nishida et al., Japanese text: the distance does not vary by more than some tens of metres)
   double max_bias_radius{50.0};
-  double lost_timeout{10.0};  ///< s of nothing but such fixes after which the estimate is what is wrong
-  double fix_timeout{10.0};   ///< s without a fix that was used after which this is dead reckoning
-  double bias_timeout{0.5};   ///< s that a fix waits for its gps/bias
-  double time_jump{1.0};      ///< s, a stamp older by more than this is a clock that was set back
+  double lost_timeout{10.0};       ///< s of nothing but such fixes after which the estimate is what is wrong
+  double fix_timeout{10.0};        ///< s without a fix that was used after which this is dead reckoning
+  double bias_timeout{0.5};        ///< s that a fix waits for its gps/bias
+  double satellites_timeout{0.5};  ///< s that a fix waits for its gps/satellites, where those before it had some
+  double time_jump{1.0};           ///< s, a stamp older by more than this is a clock that was set back
   bool reset_on_time_jump{true};
   double heading_converged_sigma{0.3};  ///< rad, heading is said to be known below this
   DatumParameters datum;
@@ -55,6 +56,7 @@ struct LocalizationParameters {
     v("lost_timeout", lost_timeout, positive());
     v("fix_timeout", fix_timeout, positive());
     v("bias_timeout", bias_timeout, non_negative());
+    v("satellites_timeout", satellites_timeout, non_negative());
     v("time_jump", time_jump, positive());
     v("reset_on_time_jump", reset_on_time_jump);
     v("heading_converged_sigma", heading_converged_sigma, positive());
@@ -138,6 +140,11 @@ class LocalizationPipeline {
   /// A velocity of the receiver. It waits for the odometry of its stamp, tells the heading from which to start, and is
   /// taken by the localizer. One that cannot be used is left out, with an event that says why.
   void add_velocity(const RawVelocity& velocity);
+  /// Whether satellites change anything.
+  bool takes_satellites() const { return localizer_->takes_satellites(); }
+  /// The satellites of the fix at `stamp`, before or after it. Once satellites have come to a fix, the next waits for
+  /// its own, by satellites_timeout at the most.
+  void add_satellites(Stamp stamp, std::vector<SatelliteObservation> satellites);
   /// The bias at a fix, where the localizer wants one.
   void add_bias(const BiasEstimate& bias);
 
@@ -182,6 +189,8 @@ class LocalizationPipeline {
   void process_velocities();
   void process_fixes();
   bool process_next_fix();
+  /// The satellites of the fix at `stamp`; nothing where there are none.
+  const std::vector<SatelliteObservation>* satellites_of(Stamp stamp) const;
   void initialize_with(const PendingFix& pending);
   void remember_for_start(const PendingFix& pending);
   bool try_start(const PendingFix& pending);
@@ -231,6 +240,9 @@ class LocalizationPipeline {
   std::optional<Stamp> last_start_fix_;  ///< that the initial pose is being found from
   std::deque<BiasEstimate> biases_;
   double last_radius_m_{0.0};
+  std::deque<std::pair<Stamp, std::vector<SatelliteObservation>>> satellites_;
+  bool fixes_have_satellites_{false};    ///< the last one had
+  std::optional<Stamp> last_corrected_;  ///< fix that the localizer took
 
   bool initialized_{false};
   bool lost_{false};

@@ -60,7 +60,9 @@ struct SatelliteReport {
   double cn0_dbhz{0.0};  ///< rounded to 1 dB; NaN where not tracked
   bool is_tracked{false};
   bool is_used{false};
-  double residual_m{0.0};  ///< in the receiver's own solution; NaN where not used
+  /// Measured minus expected range at the fix's position (as sentence GRS of NMEA 0183 has it, but for the sign), with
+  /// the clocks that fit best there; NaN where not used.
+  double residual_m{0.0};
 
   PathClass path_class{PathClass::kBlocked};  ///< truth
   double range_error_m{0.0};  ///< truth, of the pseudorange, without the receiver's clock; NaN where not tracked
@@ -110,6 +112,9 @@ class Receiver {
   /// The ranges that go into the solution, and in measured_ whose they are.
   std::vector<RangeMeasurement> measure(double interval_s, const std::vector<ReceivedSatellite>& satellites,
                                         const std::vector<SatelliteReport>& reports);
+  /// Residuals of a solution become those of a position that is `moved` (m) from it, each clock fitted anew.
+  void refer_residuals(const std::vector<RangeMeasurement>& measurements, const Eigen::Vector3d& moved,
+                       std::vector<SatelliteReport>& reports) const;
   Channel& channel_of(const SatelliteId& id);
   Eigen::Vector3d smoothed(double interval_s, const Eigen::Vector3d& solution);
 

@@ -1,0 +1,196 @@
+#include "urban_gnss_localization/gnss/range_fix.hpp"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+namespace urban_gnss {
+namespace {
+
+constexpr double kReferenceSine = 0.6;  ///< of the elevation, 37 degrees
+constexpr double kLowestSine = 0.1;
+constexpr double kFreeShare = 0.9;  ///< quantile of C/N0 that free signals have
+constexpr double kMostCertain = 0.98;
+constexpr double kMaxLogOdds = 30.0;
+constexpr double kFarthest_m = 100.0;
+constexpr double kLeastSigma_m = 1e-3;
+constexpr double kMaxResidual_m = 1e5;  ///< beyond it, a driver's invention
+constexpr int kRounds = 4;
+constexpr int kPlane = 2;
+constexpr int kHeight = 2;
+constexpr int kFirstClock = 3;
+
+/// As if at kReferenceSine.
+double levelled_cn0_dbhz(const SatelliteObservation& satellite, const RangeFixParameters& p) {
+  return satellite.cn0_dbhz - p.antenna_cn0_rise * (std::sin(satellite.look.elevation_rad) - kReferenceSine);
+}
+
+bool has_signal(const SatelliteObservation& satellite) {
+  return satellite.tracked && std::isfinite(satellite.look.azimuth_rad) && satellite.look.elevation_rad >= 0.0 &&
+         std::isfinite(satellite.look.elevation_rad) && std::isfinite(satellite.cn0_dbhz) && satellite.cn0_dbhz > 0.0;
+}
+
+struct SatelliteRange {
+  Constellation clock;
+  Eigen::Vector3d line_of_sight;
+  double residual_m;
+  double reflected_before;  ///< probability by C/N0
+  double reflected_m;       ///< mean, if it is
+  double reflected_variance_m2;
+};
+
+std::vector<SatelliteRange> ranges_of(const std::vector<SatelliteObservation>& satellites, double free_cn0_dbhz,
+                                      const RangeFixParameters& p) {
+  std::map<SatelliteId, const SatelliteObservation*> usable;  // one signal of each satellite
+  std::map<Constellation, int> sharing;
+  for (const SatelliteObservation& each : satellites) {
+    if (!has_signal(each) || !(std::abs(each.residual_m) <= kMaxResidual_m)) continue;
+    if (usable.emplace(each.id, &each).second) ++sharing[clock_of(each.id.constellation)];
+  }
+  std::vector<SatelliteRange> ranges;
+  for (const auto& [id, observation] : usable) {
+    const SatelliteObservation& each = *observation;
+    const Constellation clock = clock_of(id.constellation);
+    if (sharing[clock] < 2) continue;  // alone, it only tells its clock
+    const double weaker_db = free_cn0_dbhz - levelled_cn0_dbhz(each, p);
+    const double log_odds = std::clamp((weaker_db - p.weak_cn0_drop) / p.weak_cn0_width, -kMaxLogOdds, kMaxLogOdds);
+    const double reflected = 1.0 / (1.0 + std::exp(-log_odds));
+    const double larger = std::pow(kReferenceSine / std::max(std::sin(each.look.elevation_rad), kLowestSine),
+                                   p.reflected_elevation_exponent);
+    ranges.push_back({clock, line_of_sight(each.look), each.residual_m,
+                      std::clamp(reflected, 1.0 - kMostCertain, kMostCertain), larger * p.reflected_range,
+                      std::pow(larger * p.reflected_range_sigma, 2)});
+  }
+  return ranges;
+}
+
+double log_gaussian(double error, double variance) {
+  return -0.5 * error * error / variance - 0.5 * std::log(variance);
+}
+
+/// Least squares for the antenna's place, its height and the clocks, of ranges that are each reflected with a
+/// probability.
+class RangeSystem {
+ public:
+  RangeSystem(const std::vector<SatelliteRange>& ranges, const RangeFixParameters& parameters)
+      : ranges_(ranges),
+        direct_variance_m2_(parameters.range_sigma * parameters.range_sigma),
+        height_information_(1.0 / (parameters.range_height_sigma * parameters.range_height_sigma)) {
+    std::map<Constellation, int> clocks;
+    for (const SatelliteRange& range : ranges)
+      clocks.emplace(range.clock, kFirstClock + static_cast<int>(clocks.size()));
+    const auto count = static_cast<Eigen::Index>(ranges.size());
+    unknowns_ = kFirstClock + static_cast<Eigen::Index>(clocks.size());
+    h_ = Eigen::MatrixXd::Zero(count, unknowns_);
+    reflected_.resize(count);
+    for (Eigen::Index i = 0; i < count; ++i) {
+      const SatelliteRange& range = ranges[static_cast<std::size_t>(i)];
+      h_.row(i).head<3>() = -range.line_of_sight;
+      h_(i, clocks.at(range.clock)) = 1.0;
+      reflected_[i] = range.reflected_before;
+    }
+  }
+
+  /// Maximization: the normal equations, where every range counts as both kinds by its probability.
+  void weigh() {
+    Eigen::VectorXd weight(h_.rows());
+    Eigen::VectorXd target(h_.rows());
+    for (Eigen::Index i = 0; i < h_.rows(); ++i) {
+      const SatelliteRange& range = ranges_[static_cast<std::size_t>(i)];
+      const double by_reflection = reflected_[i] / range.reflected_variance_m2;
+      weight[i] = (1.0 - reflected_[i]) / direct_variance_m2_ + by_reflection;
+      target[i] = range.residual_m - by_reflection * range.reflected_m / weight[i];
+    }
+    const Eigen::MatrixXd weighted = weight.asDiagonal() * h_;
+    normal_ = h_.transpose() * weighted;
+    normal_(kHeight, kHeight) += height_information_;
+    right_ = weighted.transpose() * target;
+  }
+
+  /// Expectation: which ranges are reflected, given the solution of the normal equations and what is known.
+  void judge(const RelativePlace& known) {
+    const Eigen::Matrix2d information = known.covariance.inverse();
+    Eigen::MatrixXd normal = normal_;
+    Eigen::VectorXd right = right_;
+    normal.topLeftCorner<kPlane, kPlane>() += information;
+    right.head<kPlane>() += information * known.offset;
+    const Eigen::LDLT<Eigen::MatrixXd> factors(normal);
+    const Eigen::VectorXd solution = factors.solve(right);
+    const Eigen::MatrixXd covariance = factors.solve(Eigen::MatrixXd::Identity(unknowns_, unknowns_));
+    for (Eigen::Index i = 0; i < h_.rows(); ++i) {
+      const SatelliteRange& range = ranges_[static_cast<std::size_t>(i)];
+      const double error = range.residual_m - h_.row(i).dot(solution);
+      const double variance = h_.row(i) * covariance * h_.row(i).transpose();
+      const double log_odds = std::log(range.reflected_before / (1.0 - range.reflected_before)) +
+                              log_gaussian(error - range.reflected_m, range.reflected_variance_m2 + variance) -
+                              log_gaussian(error, direct_variance_m2_ + variance);
+      reflected_[i] = 1.0 / (1.0 + std::exp(-std::clamp(log_odds, -kMaxLogOdds, kMaxLogOdds)));
+    }
+  }
+
+  /// The place by the normal equations: height and clocks are whatever fits best.
+  RelativePlace place() const {
+    const Eigen::Index others = unknowns_ - kPlane;
+    const Eigen::MatrixXd gain =
+        normal_.bottomRightCorner(others, others).ldlt().solve(normal_.bottomLeftCorner(others, kPlane)).transpose();
+    Eigen::Matrix2d information =
+        normal_.topLeftCorner<kPlane, kPlane>() - gain * normal_.bottomLeftCorner(others, kPlane);
+    information = 0.5 * (information + information.transpose()).eval();
+    information.diagonal().array() += 1.0 / (kFarthest_m * kFarthest_m);
+    RelativePlace result;
+    result.covariance = information.inverse();
+    result.offset = result.covariance * (right_.head<kPlane>() - gain * right_.tail(others));
+    return result;
+  }
+
+ private:
+  const std::vector<SatelliteRange>& ranges_;
+  double direct_variance_m2_;
+  double height_information_;
+  Eigen::Index unknowns_;
+  Eigen::MatrixXd h_;
+  Eigen::VectorXd reflected_;  ///< probabilities
+  Eigen::MatrixXd normal_;
+  Eigen::VectorXd right_;
+};
+
+}  // namespace
+
+void FreeSignalLevel::add(const std::vector<SatelliteObservation>& satellites, const RangeFixParameters& parameters) {
+  for (const SatelliteObservation& each : satellites) {
+    if (!has_signal(each)) continue;
+    const double level = std::clamp(std::round(levelled_cn0_dbhz(each, parameters)), 0.0, kBins - 1.0);
+    ++counts_[static_cast<std::size_t>(level)];
+    ++total_;
+  }
+}
+
+std::optional<double> FreeSignalLevel::cn0_dbhz() const {
+  if (total_ == 0) return std::nullopt;
+  double below = 0.0;
+  for (std::size_t bin = 0; bin < kBins; ++bin) {
+    below += counts_[bin];
+    if (below >= kFreeShare * total_) return static_cast<double>(bin);
+  }
+  return kBins - 1.0;
+}
+
+std::optional<RelativePlace> range_fix(const std::vector<SatelliteObservation>& satellites, double free_cn0_dbhz,
+                                       const RelativePlace& known, const RangeFixParameters& parameters) {
+  const std::vector<SatelliteRange> ranges = ranges_of(satellites, free_cn0_dbhz, parameters);
+  if (ranges.empty()) return std::nullopt;
+  RelativePlace certain = known;  // never wholly, so that it can be inverted
+  certain.covariance.diagonal().array() += kLeastSigma_m * kLeastSigma_m;
+  RangeSystem system(ranges, parameters);
+  for (int round = 0; round < kRounds; ++round) {
+    system.weigh();
+    system.judge(certain);
+  }
+  system.weigh();
+  const RelativePlace place = system.place();
+  if (!place.offset.allFinite() || !(place.covariance.determinant() > 0.0)) return std::nullopt;
+  return place;
+}
+
+}  // namespace urban_gnss
