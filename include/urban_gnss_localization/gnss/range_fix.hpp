@@ -18,15 +18,15 @@ struct RangeFixParameters {
   bool use_ranges{true};        ///< the ranges of a fix in place of the fix, where the receiver reports their residuals
   double range_sigma{5.0};      ///< m, of a range in line of sight, before anything is learnt: noise, multipath, orbits
   double range_sigma_min{1.0};  ///< m, the least that it can be learnt to be,
-  double range_sigma_max{7.0};  ///< m, and the most: larger errors are those of reflections
+  double range_sigma_max{8.0};  ///< m, and the most: larger errors are those of reflections
   double reflected_range{18.0};  ///< m, mean by which a range is too long that is not in line of sight, at 37 degrees
-  double reflected_range_sigma{15.0};        ///< m, about that mean
+  double reflected_range_sigma{14.0};        ///< m, about that mean
   double reflected_elevation_exponent{0.7};  ///< both grow with this power of 1 / sin(elevation)
-  double weak_cn0_drop{12.0};                ///< dB below a free signal at which one is as likely reflected as direct
+  double weak_cn0_drop{14.0};                ///< dB below a free signal at which one is as likely reflected as direct
   double weak_cn0_width{4.0};                ///< dB, that change these odds by e
   double antenna_cn0_rise{10.0};             ///< dB, of a free signal's C/N0 from the horizon to the zenith
   double range_height_sigma{30.0};           ///< m, of the receiver's own height
-  double range_correlation_time{5.0};        ///< s, over which the error of ranges stays the same
+  double range_correlation_time{6.0};        ///< s, over which the error of ranges stays the same
   double range_bias_odds{0.03};              ///< factor on the odds of a bias of a fix whose ranges are known
 
   template <class V>
