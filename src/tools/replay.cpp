@@ -24,7 +24,6 @@
 #include "urban_gnss_localization/filters/switching_particle_filter.hpp"
 #include "urban_gnss_localization/filters/ukf.hpp"
 #include "urban_gnss_localization/ros/conversions.hpp"
-#include "urban_gnss_localization/ros/localizer_node.hpp"
 #include "urban_gnss_localization/ros/topics.hpp"
 #include "urban_gnss_localization/ros/visibility_messages.hpp"
 
