@@ -72,6 +72,7 @@ FixVerdict ImmEkf::correct(const FixMeasurement& declared) {
   }
   const Gaussian before = mixture();
   const FixMeasurement fix = receiver_.believed(declared, before);
+  verdict.of_ranges = receiver_.of_ranges();
   const double elapsed_s = receiver_.elapsed_s(fix.time_s);
   const FixNoise noise = receiver_.fix_noise(fix.time_s);
   const ModeTransition transition = mode_transition(elapsed_s, parameters_.modes, receiver_.bias_odds());

@@ -129,6 +129,7 @@ FixVerdict SwitchingParticleFilter::correct(const FixMeasurement& declared) {
   }
   const BiasGaussian before = mixture();
   const FixMeasurement fix = receiver_.believed(declared, before);
+  verdict.of_ranges = receiver_.of_ranges();
   const Eigen::Vector2d innovation = fix.position - transform_point(estimate_, fix.antenna_in_body);
   const Eigen::Matrix2d covariance =
       before.covariance.topLeftCorner<2, 2>() + parameters_.model.fix.direct_covariance(fix.covariance);

@@ -73,6 +73,7 @@ void LocalizationPipeline::reset(const std::string& why) {
   last_verdict_ = {};
   fixes_used_ = 0;
   fixes_rejected_ = 0;
+  fixes_with_ranges_ = 0;
   velocities_used_ = 0;
   start_.reset();
   if (parameters_.initial_pose.size() == 3) {
@@ -290,6 +291,7 @@ void LocalizationPipeline::decide(FixVerdict verdict) {
     ++fixes_rejected_;
   } else {
     ++fixes_used_;
+    if (verdict.of_ranges) ++fixes_with_ranges_;
     last_used_ = verdict.stamp;
   }
   last_verdict_ = verdict;

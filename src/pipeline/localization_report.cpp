@@ -40,6 +40,7 @@ LocalizationReport LocalizationPipeline::report() const {
   report.last_fix = last_verdict_;
   report.fixes_used = fixes_used_;
   report.fixes_rejected = fixes_rejected_;
+  report.fixes_with_ranges = fixes_with_ranges_;
   report.velocities_used = velocities_used_;
   report.bias_radius_m = last_radius_m_;
   if (last_odometry_ && last_used_) report.fix_age_s = to_seconds(last_odometry_->stamp - *last_used_);

@@ -266,6 +266,7 @@ msgs::LocalizationStatus to_message(const LocalizationReport& report, const Loca
   message.last_fix = to_message(report.last_fix);
   message.fixes_used = report.fixes_used;
   message.fixes_rejected = report.fixes_rejected;
+  message.fixes_with_ranges = report.fixes_with_ranges;
   message.velocities_used = report.velocities_used;
   message.fix_age = report.fix_age_s;
   message.odometry_age = report.odometry_age_s;

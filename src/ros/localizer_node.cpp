@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "urban_gnss_localization/ros/topics.hpp"
+#include "urban_gnss_localization/ros/visibility_messages.hpp"
 
 namespace urban_gnss {
 namespace {
@@ -37,6 +38,9 @@ LocalizerNode::LocalizerNode(ros::NodeHandle& node, ros::NodeHandle& private_nod
   }
   if (pipeline_.takes_velocity()) {
     subscribers_.push_back(node.subscribe(topics::kVelocity, 100, &Self::on_velocity, this, kNoDelay));
+  }
+  if (pipeline_.takes_satellites()) {
+    subscribers_.push_back(node.subscribe(topics::kSatellites, 100, &Self::on_satellites, this, kNoDelay));
   }
   if (parameters_.localization.use_imu_yaw_rate) {
     subscribers_.push_back(node.subscribe(topics::kImu, 1000, &Self::on_imu, this, kNoDelay));
@@ -80,6 +84,11 @@ void LocalizerNode::on_velocity(const topic_tools::ShapeShifter& message) {
     return;
   }
   pipeline_.add_velocity(*velocity);
+  publish_results();
+}
+
+void LocalizerNode::on_satellites(const urban_gnss_localization::SatelliteArray& message) {
+  pipeline_.add_satellites(to_stamp(message.header.stamp), to_observations(message));
   publish_results();
 }
 
@@ -277,6 +286,7 @@ void LocalizerNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status
   status.add("fixes used", report.fixes_used);
   status.add("fixes rejected", report.fixes_rejected);
   status.add("fix age (s)", report.fix_age_s);
+  status.add("fixes with ranges", report.fixes_with_ranges);
   status.add("velocities used", report.velocities_used);
   status.add("position sigma (m)", report.position_sigma_m);
   status.add("heading sigma (rad)", report.health.heading_sigma_rad);

@@ -15,6 +15,7 @@
 
 #include "bag_messages.hpp"
 #include "output_file.hpp"
+#include "replay_parameters.hpp"
 #include "urban_gnss_localization/common/progress.hpp"
 #include "urban_gnss_localization/evaluation/report_json.hpp"
 #include "urban_gnss_localization/evaluation/tum.hpp"
@@ -23,7 +24,6 @@
 #include "urban_gnss_localization/filters/switching_particle_filter.hpp"
 #include "urban_gnss_localization/filters/ukf.hpp"
 #include "urban_gnss_localization/ros/conversions.hpp"
-#include "urban_gnss_localization/ros/localizer_node.hpp"
 #include "urban_gnss_localization/ros/topics.hpp"
 #include "urban_gnss_localization/ros/visibility_messages.hpp"
 
@@ -33,100 +33,10 @@ using urban_gnss_localization::SatelliteArray;
 
 namespace {
 
-struct Options {
-  std::string input;
-  std::string localizer = "imm_ekf";
-  std::vector<std::string> params;
-  std::vector<std::string> overrides;
-  std::string output;
-  std::string fix_topic = topics::kFix;
-  std::string odom_topic = topics::kOdometry;
-  std::string imu_topic = topics::kImu;
-  bool wants_imu = false;  ///< imu_topic was asked for
-  std::string velocity_topic = topics::kVelocity;
-  bool wants_velocity = false;  ///< velocity_topic was asked for
-  std::string satellites_topic = topics::kSatellites;
-  bool wants_satellites = false;  ///< satellites_topic was asked for
-  std::string truth_topic = topics::kTruth;
-  std::vector<double> datum;
-  int seed = -1;
-  std::string json_file;
-  std::string tum_file;
-};
-
-/// All that is configurable: what the live localizer and the live bias node read.
-struct Parameters {
-  LocalizerNodeParameters node;
-  ParticleFilterParameters filter;
-  ImmEkfParameters imm;
-  UkfParameters ukf;
-  MotionParameters motion;
-  GpsBiasParameters bias;
-  ComplementaryEkfParameters complementary;
-};
-
-/// Files in their order, later values over earlier ones. A file may hold the parameters flat, or by node as rosparam
-/// does (`particle_filter:` with `gps_bias:`, `complementary_ekf:`).
-YAML::Node merge_parameters(const Options& options) {
-  YAML::Node merged(YAML::NodeType::Map);
-  const auto merge = [&merged](const YAML::Node& map) {
-    for (const auto& entry : map) merged[entry.first.as<std::string>()] = entry.second;
-  };
-  for (const std::string& file : options.params) {
-    YAML::Node map;
-    try {
-      map = YAML::LoadFile(file);
-    } catch (const YAML::Exception& error) {
-      throw std::runtime_error("--params " + file + ": " + error.what());
-    }
-    if (!map.IsMap() && !map.IsNull())
-      throw std::runtime_error("--params " + file + ": must be a map of names to values");
-    for (const std::string section : {"gps_bias", "particle_filter", "complementary_ekf", "imm_ekf", "ukf"}) {
-      if (!map.IsMap() || !map[section].IsDefined()) continue;
-      // Sections of other localizers may use the same names for other things.
-      if (section == options.localizer || (section == "gps_bias" && options.localizer == "particle_filter")) {
-        merge(map[section]);
-      }
-      map.remove(section);
-    }
-    if (map.IsMap()) merge(map);
-  }
-  if (options.wants_imu) merged["use_imu_yaw_rate"] = true;
-  for (const std::string& text : options.overrides) {
-    const auto equal = text.find('=');
-    if (equal == std::string::npos) throw std::runtime_error("--set " + text + ": must be NAME=VALUE");
-    merged[text.substr(0, equal)] = YAML::Load(text.substr(equal + 1));
-  }
-  if (options.seed >= 0) merged["seed"] = options.seed;
-  if (!options.datum.empty()) merged["datum"] = options.datum;
-  return merged;
-}
-
-Parameters read_parameters(const Options& options) {
-  Parameters parameters;
-  ParameterReader reader(merge_parameters(options));
-  for (const char* live_only : {"particle_cloud_rate", "estimate_timeout", "diagnostic_period"})
-    reader.ignore(live_only);
-  reader.read(parameters.node);
-  if (options.localizer == "complementary_ekf") {
-    reader.read(parameters.complementary);
-  } else if (options.localizer == "imm_ekf") {
-    reader.read(parameters.imm).read(parameters.motion);
-  } else if (options.localizer == "ukf") {
-    reader.read(parameters.ukf).read(parameters.motion);
-  } else {
-    reader.read(parameters.filter).read(parameters.motion).read(parameters.bias);
-  }
-  if (options.localizer != "particle_filter") reader.ignore("seed");  // nothing in the others is random
-  const auto faults = reader.finish();
-  if (!faults.empty()) throw ParameterError("replay", faults);
-  return parameters;
-}
-
 /// The pipeline and the bias filter of one run, with what it writes.
 class Replay {
  public:
-  Replay(const Options& options, const Parameters& parameters)
+  Replay(const ReplayOptions& options, const ReplayParameters& parameters)
       : parameters_(parameters),
         pipeline_(parameters.node.localization, make_localizer(options.localizer, parameters)),
         bias_tracker_(parameters.bias) {
@@ -191,7 +101,7 @@ class Replay {
   }
 
  private:
-  std::unique_ptr<Localizer> make_localizer(const std::string& name, const Parameters& parameters) {
+  std::unique_ptr<Localizer> make_localizer(const std::string& name, const ReplayParameters& parameters) {
     if (name == "particle_filter") return make_particle_filter(parameters.filter, parameters.motion);
     if (name == "imm_ekf") return std::make_unique<ImmEkf>(parameters.imm, parameters.motion);
     if (name == "ukf") return std::make_unique<Ukf>(parameters.ukf, parameters.motion);
@@ -243,7 +153,7 @@ class Replay {
     if (bag_.isOpen()) bag_.write("/" + topic, std::max(to_ros(stamp), ros::TIME_MIN), message);
   }
 
-  Parameters parameters_;
+  ReplayParameters parameters_;
   ComplementaryEkf* complementary_{nullptr};  ///< the pipeline's localizer, where it is that one
   LocalizationPipeline pipeline_;
   BiasTracker bias_tracker_;
@@ -271,8 +181,8 @@ void print_summary(const Replay& replay, const nlohmann::json& metrics, double w
             << 100.0 * metrics["errors"]["coverage"].get<double>() << " %\n";
 }
 
-void run(const Options& options) {
-  const Parameters parameters = read_parameters(options);
+void run(const ReplayOptions& options) {
+  const ReplayParameters parameters = read_parameters(options);
   if (!fs::exists(options.input)) throw std::runtime_error(options.input + ": no such bag");
   rosbag::Bag bag(options.input, rosbag::bagmode::Read);
 
@@ -338,6 +248,7 @@ void run(const Options& options) {
                             {"seed", parameters.filter.seed},
                             {"estimates", replay.estimate().size()},
                             {"decisions", replay.decisions()},
+                            {"fixes_with_ranges", report.fixes_with_ranges},
                             {"velocities_used", report.velocities_used}};
   metrics["final_state"] = to_string(report.state);
   if (const auto& frame = replay.pipeline().frame()) {
@@ -362,7 +273,7 @@ void run(const Options& options) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  Options options;
+  ReplayOptions options;
   CLI::App app("Runs a bag through a localizer offline; the same input, parameters and seed give the same output.");
   app.option_defaults()->always_capture_default();
   app.add_option("bag", options.input, "the bag to read")->required();

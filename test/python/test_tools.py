@@ -166,6 +166,7 @@ class ToolTest(unittest.TestCase):
         write_recording(self.directory)
         self.succeed("csv_to_bag", self.directory, self.path("in.bag"))
         self.assertIn("/odom (nav_msgs/Odometry)", self.refuse("replay", self.path("in.bag"), "--fix-topic", "fix"))
+        self.assertIn("on sky (--satellites-topic)", self.refuse("replay", self.path("in.bag"), "--satellites-topic", "sky"))
         self.assertIn("no such localizer", self.refuse("replay", self.path("in.bag"), "--localizer", "magic"))
         self.assertIn("no such bag", self.refuse("replay", self.path("absent.bag")))
         output = self.refuse("replay", self.path("in.bag"), *RANDOM, "--set", "particle_count=0", "--set", "ring_shar=0.1")

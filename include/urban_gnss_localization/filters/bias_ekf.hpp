@@ -135,6 +135,8 @@ class ReceiverModel {
   /// The fix as far as it is believed: what its ranges say beside the state `before` it (range_fix()) where it has
   /// them, else with its covariance by FixNoiseModel::believed(). Once a fix, before the others of this class.
   FixMeasurement believed(const FixMeasurement& fix, const BiasGaussian& before);
+  /// Whether the last fix was what its ranges say.
+  bool of_ranges() const { return of_ranges_; }
   /// m, of a range in line of sight, as learnt.
   double range_sigma_m() const;
   FixNoise fix_noise(double time_s) const {

@@ -35,6 +35,7 @@ struct FixVerdict {
   double nis_threshold{std::numeric_limits<double>::quiet_NaN()};  ///< chi-square quantile it was compared with
   int nis_dof{0};
   bool covariance_clamped{false};
+  bool of_ranges{false};  ///< its ranges were taken in place of its position
   std::string reason;
 };
 

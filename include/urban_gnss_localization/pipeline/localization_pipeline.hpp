@@ -98,7 +98,8 @@ struct LocalizationReport {
   FixVerdict last_fix;
   std::uint64_t fixes_used{0};
   std::uint64_t fixes_rejected{0};
-  std::uint64_t velocities_used{0};  ///< of the receiver
+  std::uint64_t fixes_with_ranges{0};  ///< of those used, with FixVerdict::of_ranges
+  std::uint64_t velocities_used{0};    ///< of the receiver
   double fix_age_s{std::numeric_limits<double>::quiet_NaN()};
   double odometry_age_s{0.0};
   double position_sigma_m{std::numeric_limits<double>::quiet_NaN()};
@@ -252,6 +253,7 @@ class LocalizationPipeline {
   FixVerdict last_verdict_;
   std::uint64_t fixes_used_{0};
   std::uint64_t fixes_rejected_{0};
+  std::uint64_t fixes_with_ranges_{0};
   std::uint64_t velocities_used_{0};
 
   std::vector<LocalizationOutput> outputs_;

@@ -13,6 +13,7 @@
 #include <topic_tools/shape_shifter.h>
 #include <urban_gnss_localization/FromLL.h>
 #include <urban_gnss_localization/GpsBias.h>
+#include <urban_gnss_localization/SatelliteArray.h>
 #include <urban_gnss_localization/SetDatum.h>
 #include <urban_gnss_localization/SetPose.h>
 #include <urban_gnss_localization/ToLL.h>
@@ -52,9 +53,9 @@ struct LocalizerNodeParameters {
 /// The shell of every localizer: topics, services, tf, status and diagnostics around a LocalizationPipeline. A
 /// localizer node makes its filter, hands it over and, where it has more to show, publishes that in `on_output`.
 ///
-/// Subscribes odom, gps/fix, initialpose, gps/datum; gps/bias and gps/velocity where the filter wants them; imu/data
-/// where use_imu_yaw_rate is set. Publishes odometry/filtered, tf map -> odom, ~status, and gps/datum (latched) where
-/// it found the datum itself. Services set_pose, datum, toLL, fromLL, ~reset.
+/// Subscribes odom, gps/fix, initialpose, gps/datum; gps/bias, gps/velocity and gps/satellites where the filter wants
+/// them; imu/data where use_imu_yaw_rate is set. Publishes odometry/filtered, tf map -> odom, ~status, and gps/datum
+/// (latched) where it found the datum itself. Services set_pose, datum, toLL, fromLL, ~reset.
 class LocalizerNode {
  public:
   using OutputHook = std::function<void(const LocalizationOutput&)>;
@@ -69,6 +70,7 @@ class LocalizerNode {
   void on_fix(const sensor_msgs::NavSatFix& message);
   /// Of either type; roscpp keeps to that of the first message.
   void on_velocity(const topic_tools::ShapeShifter& message);
+  void on_satellites(const urban_gnss_localization::SatelliteArray& message);
   void on_imu(const sensor_msgs::Imu& message);
   void on_bias(const urban_gnss_localization::GpsBias& message);
   void on_initial_pose(const geometry_msgs::PoseWithCovarianceStamped& message);
