@@ -193,8 +193,8 @@ TEST(RangeFixJudgement, AgreesWithAllAssignmentsTried) {
     by_mean += (reference.mean - c.truth).squaredNorm();
     by_least_squares += (least_squares(c.sky) - c.truth).squaredNorm();
   }
-  // Measured: 0.925 and 0.975; of all 2567, 0.57 and 0.86.
-  EXPECT_GT(sure.share_1m(), 0.9);
+  // Measured: 0.925 and 0.975 (by the seed, 0.81 to 0.96 and 0.96 to 0.99); of all 2567, 0.57 and 0.86.
+  EXPECT_GT(sure.share_1m(), 0.85);
   EXPECT_GT(sure.share_half_sigma(), 0.95);
   EXPECT_GT(all.share_1m(), 0.5);
   EXPECT_GT(all.share_half_sigma(), 0.8);

@@ -94,6 +94,16 @@ TEST(SatellitesOfFixes, AreWaitedForAtMostTheTimeout) {
   EXPECT_EQ(never.taken(), 2u);
 }
 
+TEST(SatellitesOfFixes, TimeoutIsNotNegative) {
+  for (const auto& [value, fault_count] : {std::pair{"0.0", 0u}, {"-0.1", 1u}, {".nan", 1u}}) {
+    const YAML::Node map = YAML::Load(std::string("satellites_timeout: ") + value);
+    ParameterReader reader(map);
+    LocalizationParameters parameters;
+    reader.read(parameters);
+    EXPECT_EQ(reader.finish().size(), fault_count) << value;
+  }
+}
+
 TEST(SatellitesOfFixes, AreNotWaitedForWhereNoneEverCame) {
   SkyRig rig;
   for (const double time : {1.0, 2.0, 3.0}) {
