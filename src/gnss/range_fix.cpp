@@ -189,7 +189,9 @@ std::optional<RelativePlace> range_fix(const std::vector<SatelliteObservation>& 
   }
   system.weigh();
   const RelativePlace place = system.place();
-  if (!place.offset.allFinite() || !(place.covariance.determinant() > 0.0)) return std::nullopt;
+  // Ranges of micrometres leave nothing but rounding errors of a direction of which they say nothing.
+  const bool is_positive_definite = place.covariance(0, 0) > 0.0 && place.covariance.determinant() > 0.0;
+  if (!place.offset.allFinite() || !is_positive_definite) return std::nullopt;
   return place;
 }
 

@@ -13,7 +13,8 @@ inline constexpr std::size_t kMaxWaitingFixes = 1000;
 
 /// How many epochs of satellites are remembered, for fixes that wait for odometry.
 inline constexpr std::size_t kMaxWaitingSatellites = 100;
-/// Satellites that are no farther from a fix are its own: some drivers round one of the two stamps.
-inline constexpr double kSameEpoch_s = 0.02;
+/// Satellites that are no farther from a fix are its own: some drivers round one of the two stamps. Half the interval of
+/// a receiver with 50 Hz: those of its other fixes are farther.
+inline constexpr double kSameEpoch_s = 0.01;
 
 }  // namespace urban_gnss

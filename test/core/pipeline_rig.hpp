@@ -30,6 +30,7 @@ struct FakeLocalizer : Localizer {
   std::vector<FixMeasurement> fixes;
   bool takes{true};  ///< velocities
   std::vector<VelocityMeasurement> velocities;
+  bool takes_sky{true};  ///< satellites
 
   const char* name() const override { return "fake"; }
   std::string mode() const override { return "fake"; }
@@ -51,6 +52,7 @@ struct FakeLocalizer : Localizer {
   }
   bool takes_velocity() const override { return takes; }
   void correct_velocity(const VelocityMeasurement& velocity) override { velocities.push_back(velocity); }
+  bool takes_satellites() const override { return takes_sky; }
   Pose2 pose() const override { return state.pose; }
   PoseEstimate estimate() const override { return state; }
   LocalizerHealth health() const override {

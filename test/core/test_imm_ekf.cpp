@@ -284,20 +284,6 @@ TEST(ImmEkf, LeverArmIsInTheAntennasPlace) {
   EXPECT_GT(aside.pose().yaw, 0.5 * kPi + 0.03);
 }
 
-TEST(ImmEkf, OddsOfABiasMatter) {
-  const auto direct_after = [](double odds) {
-    ImmEkf imm = make();
-    SwitchingDrive d;
-    d.duration_s = 60.0;
-    drive(imm, d);
-    imm.set_bias_odds(odds);
-    imm.correct(fix_of(imm.pose().position() + Eigen::Vector2d(1.5, 0.0), 0.5, 65.0));
-    return imm.mode_probabilities()[0];
-  };
-  EXPECT_LT(direct_after(30.0), direct_after(1.0) - 0.01);
-  EXPECT_GT(direct_after(1.0 / 30.0), direct_after(1.0));
-}
-
 TEST(ImmEkf, EveryParameterHasAnEffectF36) {
   const std::vector<std::pair<std::string, std::string>> changes = {
       {"use_fix_covariance: false", "{}"},
@@ -330,8 +316,9 @@ TEST(ImmEkf, EveryParameterHasAnEffectF36) {
       {"first_fix_scale: 3.0", "fix_scale_rate: 0.1"},
       {"yaw_rate_scale_sigma: 0.02", "{}"},
   };
-  // Elsewhere: those of a parked robot, common_error_sigma, fix_covariance_weight, the velocity's.
-  EXPECT_EQ(changes.size() + 4 + parameter_names(VelocityNoiseParameters{}).size(),
+  // Elsewhere: those of a parked robot, common_error_sigma, fix_covariance_weight, the velocity's and the ranges'.
+  EXPECT_EQ(changes.size() + 4 + parameter_names(VelocityNoiseParameters{}).size() +
+                parameter_names(RangeFixParameters{}).size(),
             parameter_names(ImmEkfParameters{}).size());
   SwitchingDrive d;
   d.bias = bias_between(20.0, 40.0, {4.0, 3.0});

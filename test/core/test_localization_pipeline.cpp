@@ -309,6 +309,7 @@ std::string trace(const std::string& base, const std::string& change, bool wants
       if (k == 280) fix.covariance *= 1e6;
       rig.pipeline.add_fix(fix);
     }
+    if (k == 30 || k == 350) rig.pipeline.add_satellites(Rig::at(time), {});  // the next fix has none
     if (k < 300 || k > 315) rig.drive(time);
     if (k == 350) rig.drive(time - 0.7);  // late, and not a clock that was set back
     note();
@@ -341,6 +342,7 @@ TEST(LocalizationPipeline, EveryParameterHasAnEffectF36) {
       {"lost_timeout", {far_off, "5.0"}},
       {"fix_timeout", {given, "3.0"}},
       {"bias_timeout", {given, "0.2"}},
+      {"satellites_timeout", {given, "0.2"}},
       {"time_jump", {given, "0.5"}},
       {"reset_on_time_jump", {given, "false"}},
       {"heading_converged_sigma", {given, "0.1"}},

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "receiver_rig.hpp"
+#include "urban_gnss_localization/gnss/range_fix.hpp"
 #include "urban_gnss_localization/simulation/receiver.hpp"
 
 namespace urban_gnss {
@@ -133,6 +134,84 @@ TEST(Receiver, SeedDecidesAndSatellitesDoNotDisturbEachOther) {
   EXPECT_EQ(errors(1, 14), errors(1, 14));
   EXPECT_EQ(errors(1, 14), errors(1, 5));
   EXPECT_NE(errors(1, 14), errors(2, 14));
+}
+
+std::vector<SatelliteObservation> as_reported(const ReceiverEpoch& epoch) {
+  std::vector<SatelliteObservation> observations;
+  for (const SatelliteReport& report : epoch.satellites) {
+    SatelliteObservation observation;
+    observation.id = report.id;
+    observation.look = report.look;
+    observation.cn0_dbhz = report.cn0_dbhz;
+    observation.tracked = report.is_tracked;
+    observation.residual_m = report.residual_m;
+    observations.push_back(observation);
+  }
+  return observations;
+}
+
+/// A smoothed fix, and one that is not, some way off: the residuals are those of what is published.
+TEST(Receiver, ResidualsLeadFromTheFixToTheTruth) {
+  for (const double smoothing_time : {0.0, 8.0}) {
+    ReceiverParameters parameters = without_noise();
+    parameters.smoothing_time = smoothing_time;
+    parameters.angle_resolution = 0.0;
+    parameters.clock_walk = 5.0;
+    Receiver receiver(parameters, 1);
+    const Eigen::Vector3d still = Eigen::Vector3d::Zero();
+    for (int i = 0; i < 20; ++i) receiver.epoch(kEpoch, still, still, open_sky());
+    const Eigen::Vector3d moved(30.0, -20.0, 4.0);  // without the receiver's notice
+    for (int i = 0; i < 5; ++i) {
+      const ReceiverEpoch epoch = receiver.epoch(kEpoch, moved, still, open_sky());
+      ASSERT_TRUE(epoch.fix);
+      const Eigen::Vector2d error = (moved - epoch.fix->position).head<2>();
+      if (smoothing_time > 0.0) {
+        EXPECT_GT(error.norm(), 30.0);
+      }
+      const auto observations = as_reported(epoch);
+      FreeSignalLevel level;
+      level.add(observations, {});
+      RangeFixParameters p;
+      p.reflected_range = 1000.0;  // nothing is reflected
+      const auto fix =
+          range_fix(observations, *level.cn0_dbhz(), {Eigen::Vector2d::Zero(), 1e4 * Eigen::Matrix2d::Identity()}, p);
+      ASSERT_TRUE(fix);
+      EXPECT_LT((fix->offset - error).norm(), 0.2) << smoothing_time << ", " << i;
+    }
+  }
+}
+
+/// NMEA's GRS: the clocks that fit best at the position, by the weights of the receiver.
+TEST(Receiver, ResidualsOfAConstellationAverageToNothing) {
+  ReceiverParameters parameters;
+  parameters.channel.acquisition_time = 0.0;
+  Receiver receiver(parameters, 5);
+  auto sky = open_sky();
+  sky[2].paths.reflections = {reflection(30.0, 3.0)};
+  sky[10].paths.is_blocked = true;
+  sky[10].paths.has_direct = false;
+  sky[10].paths.reflections = {reflection(50.0, 6.0)};
+  int fixes = 0;
+  double largest = 0.0;
+  for (int i = 0; i < 50; ++i) {
+    const Eigen::Vector3d antenna(3.0 * i, 0.0, 1.0);
+    const ReceiverEpoch epoch = receiver.epoch(kEpoch, antenna, {2.0, 0.0, 0.0}, sky);
+    if (!epoch.fix) continue;
+    ++fixes;
+    std::map<Constellation, double> sum, weights;
+    for (const SatelliteReport& report : epoch.satellites) {
+      EXPECT_EQ(report.is_used, std::isfinite(report.residual_m));
+      if (!report.is_used) continue;
+      const double weight = std::pow(10.0, 0.1 * (report.cn0_dbhz - 40.0));  // of a variance that falls with C/N0
+      sum[report.id.constellation] += weight * report.residual_m;
+      weights[report.id.constellation] += weight;
+      largest = std::max(largest, std::abs(report.residual_m));
+    }
+    EXPECT_EQ(sum.size(), 2u);
+    for (const auto& [constellation, value] : sum) EXPECT_NEAR(value / weights[constellation], 0.0, 1e-9);
+  }
+  EXPECT_GT(fixes, 30);
+  EXPECT_GT(largest, 10.0);
 }
 
 TEST(Receiver, ParametersMustBeInOrder) {

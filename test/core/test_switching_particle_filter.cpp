@@ -300,8 +300,10 @@ TEST(SwitchingParticleFilter, EveryParameterHasAnEffectF36) {
       {"estimate: mean", kOftenBiased},
       {"cluster_cell: 20.0", kOftenBiased},
   };
-  // Those of the other modes, of a parked robot, of changing declarations, and of the covariance alone.
-  EXPECT_EQ(changes.size() + 14, parameter_names(ParticleFilterParameters{}).size());
+  // Those of the other modes, of a parked robot, of changing declarations, and of the covariance alone; elsewhere,
+  // those of ranges.
+  EXPECT_EQ(changes.size() + 14 + parameter_names(RangeFixParameters{}).size(),
+            parameter_names(ParticleFilterParameters{}).size());
   SwitchingDrive d;
   d.bias = bias_between(10.0, 20.0, {4.0, 3.0});
   d.duration_s = 30.0;
