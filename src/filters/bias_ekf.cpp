@@ -91,8 +91,11 @@ BiasEkfUpdate take_fix(BiasGaussian& state, BiasMode mode, const FixMeasurement&
   const Eigen::Vector2d innovation =
       fix.position - predicted - (is_direct ? Eigen::Vector2d::Zero().eval() : Eigen::Vector2d(state.mean.tail<2>()));
   const Gain with_fix = state.covariance * h.transpose();
-  const Eigen::Matrix2d white =
-      noise.scale * (is_direct ? p.fix.direct_covariance(fix.covariance) : p.fix.shadow_covariance(fix.covariance));
+  Eigen::Matrix2d white = fix.covariance;
+  if (!noise.of_ranges) {
+    white =
+        noise.scale * (is_direct ? p.fix.direct_covariance(fix.covariance) : p.fix.shadow_covariance(fix.covariance));
+  }
   const Eigen::Matrix2d hph = h * with_fix;
   BiasEkfUpdate update;
   update.white_nis = innovation.dot((hph + white).inverse() * innovation);

@@ -63,7 +63,7 @@ void LocalizationPipeline::reset(const std::string& why) {
   biases_.clear();
   satellites_.clear();
   fixes_have_satellites_ = false;
-  last_corrected_.reset();
+  last_taken_.reset();
   last_radius_m_ = 0.0;
   initialized_ = false;
   lost_ = false;
@@ -173,7 +173,7 @@ void LocalizationPipeline::add_bias(const BiasEstimate& bias) {
 
 void LocalizationPipeline::add_satellites(Stamp stamp, std::vector<SatelliteObservation> satellites) {
   if (!takes_satellites()) return;
-  if (last_corrected_ && is_same_epoch(stamp, *last_corrected_)) fixes_have_satellites_ = true;  // they came late
+  if (last_taken_ && is_same_epoch(stamp, *last_taken_)) fixes_have_satellites_ = true;  // they came late
   satellites_.emplace_back(stamp, std::move(satellites));
   if (satellites_.size() > kMaxWaitingSatellites) satellites_.pop_front();
   process_fixes();
@@ -184,6 +184,13 @@ const std::vector<SatelliteObservation>* LocalizationPipeline::satellites_of(Sta
   const auto found = std::find_if(satellites_.rbegin(), satellites_.rend(),
                                   [&](const auto& epoch) { return is_same_epoch(epoch.first, stamp); });
   return found != satellites_.rend() ? &found->second : nullptr;
+}
+
+std::vector<SatelliteObservation> LocalizationPipeline::take_satellites_of(Stamp fix_stamp) {
+  const auto* satellites = satellites_of(fix_stamp);
+  fixes_have_satellites_ = satellites != nullptr;
+  last_taken_ = fix_stamp;
+  return satellites ? *satellites : std::vector<SatelliteObservation>{};
 }
 
 std::optional<BiasQuery> LocalizationPipeline::bias_query() const {
@@ -265,10 +272,7 @@ void LocalizationPipeline::correct_with(const PendingFix& pending, double radius
   measurement.bias_radius_m = radius_m;
   measurement.time_s = to_seconds(pending.fix.stamp);
   measurement.stamp = pending.fix.stamp;
-  const auto* satellites = satellites_of(pending.fix.stamp);
-  fixes_have_satellites_ = satellites != nullptr;
-  last_corrected_ = pending.fix.stamp;
-  if (satellites) measurement.satellites = *satellites;
+  measurement.satellites = take_satellites_of(pending.fix.stamp);
   FixVerdict verdict = localizer_->correct(measurement);
   verdict.stamp = pending.fix.stamp;
   verdict.covariance_clamped = pending.sanitation.covariance_clamped;

@@ -52,6 +52,7 @@ void LocalizationPipeline::set_pose(const PoseEstimate& pose) {
 
 void LocalizationPipeline::initialize_with(const PendingFix& pending) {
   decide_unexamined(pending, "used for the start");
+  take_satellites_of(pending.fix.stamp);
   remember_for_start(pending);
   try_start(pending);
 }

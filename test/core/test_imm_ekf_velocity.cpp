@@ -157,10 +157,11 @@ TEST(ImmEkfVelocity, EveryParameterHasAnEffectF36) {
     return imm.pose().yaw;
   };
   const double base = heading("{}");
-  for (const char* change : {"velocity_scale_rate: 0.1", "velocity_scale_limit: 1.01", "velocity_dof: 5.0"}) {
+  for (const char* change :
+       {"velocity_scale_rate: 0.1", "velocity_scale_limit: 1.01", "velocity_dof: 5.0", "first_velocity_scale: 1.0"}) {
     EXPECT_NE(heading(change), base) << change;
   }
-  EXPECT_EQ(parameter_names(VelocityNoiseParameters{}).size(), 3u);
+  EXPECT_EQ(parameter_names(VelocityNoiseParameters{}).size(), 4u);
 }
 
 }  // namespace

@@ -260,7 +260,7 @@ TEST(RangeFix, ParametersAreChecked) {
   EXPECT_EQ(faults_of("{}"), 0u);
   EXPECT_EQ(faults_of("{range_sigma: 2.0, range_sigma_min: 2.0, range_sigma_max: 2.0}"), 0u);
   EXPECT_EQ(faults_of("{range_sigma: 0.5}"), 1u);
-  EXPECT_EQ(faults_of("{range_sigma: 8.0}"), 1u);
+  EXPECT_EQ(faults_of("{range_sigma: 8.5}"), 1u);
   EXPECT_EQ(faults_of("{range_sigma_min: 6.0, range_sigma_max: 5.5}"), 1u);
   EXPECT_GT(faults_of("{range_sigma: .nan}"), 0u);
   EXPECT_EQ(faults_of("{range_bias_odds: 0.0, range_height_sigma: -1.0, weak_cn0_width: 0.0}"), 3u);

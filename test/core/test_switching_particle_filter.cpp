@@ -296,6 +296,7 @@ TEST(SwitchingParticleFilter, EveryParameterHasAnEffectF36) {
       {"yaw_rate_scale_sigma: 0.02", "{}"},
       {"velocity_scale_rate: 0.1", "{}"},
       {"velocity_scale_limit: 1.05", "{}"},
+      {"first_velocity_scale: 1.0", "{}"},
       {"velocity_dof: 5.0", "{}"},
       {"estimate: mean", kOftenBiased},
       {"cluster_cell: 20.0", kOftenBiased},

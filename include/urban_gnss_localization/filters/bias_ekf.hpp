@@ -108,6 +108,7 @@ struct BiasEkfUpdate {
 struct FixNoise {
   double scale{1.0};      ///< learnt
   double inflation{1.0};  ///< of correlated errors
+  bool of_ranges{false};  ///< the covariance is that of the fix's ranges, which use_fix_covariance does not concern
 };
 
 /// Takes a fix of the mode `mode`. Direct reception has the heavy tails of Student's t: a fix that is far off is one of
@@ -140,8 +141,8 @@ class ReceiverModel {
   /// m, of a range in line of sight, as learnt.
   double range_sigma_m() const;
   FixNoise fix_noise(double time_s) const {
-    return {of_ranges_ ? 1.0 : noise_.scale(),
-            of_ranges_ ? range_noise_.correlation_inflation(time_s) : noise_.correlation_inflation(time_s)};
+    if (of_ranges_) return {1.0, range_noise_.correlation_inflation(time_s), true};
+    return {noise_.scale(), noise_.correlation_inflation(time_s), false};
   }
   /// Prior odds of a bias of the fix, against those of the parameters: bias_odds of mode_transition().
   double bias_odds() const { return of_ranges_ ? parameters_.ranges.range_bias_odds : 1.0; }

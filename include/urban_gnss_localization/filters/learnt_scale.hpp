@@ -15,9 +15,11 @@ class LearntScale {
   static constexpr double kMedianNis = 1.3862943611198906;
 
   /// `rate`: of a measurement, 0 to 1; `limit` >= 1: factor by which declared standard deviations may be wrong;
-  /// `first`: what it is before anything is learnt.
+  /// `first`: what it is before anything is learnt, within the limit.
   LearntScale(double rate, double limit, double first = 1.0)
-      : rate_(rate), log_limit_(2.0 * std::log(limit)), log_scale_(std::log(first)) {}
+      : rate_(rate),
+        log_limit_(2.0 * std::log(limit)),
+        log_scale_(std::clamp(std::log(first), -log_limit_, log_limit_)) {}
 
   double value() const { return std::exp(log_scale_); }
   /// One measurement, with a share `exceeding` (0 to 1) of its NIS, at k times the declared covariance, beyond

@@ -82,10 +82,12 @@ struct RelativePlace {
 /// h_i = -(line of sight, ...) and a clock for each constellation.
 ///
 /// A range is either in line of sight, with an error of range_sigma, or reflected: too long, by a Gaussian of
-/// reflected_range. Before it is compared with the others, its C/N0 says which (odds as in GnssCovarianceParameters,
-/// against `free_cn0_dbhz`). Where the ranges, the place `known` before and the height agree, decides: expectation
-/// maximization over which are reflected, a fixed number of rounds. `known` is not part of the result: that is the
-/// likelihood of the ranges, with at least 100 m where they say nothing.
+/// reflected_range. Before it is compared with the others, its C/N0 says which (log-odds by weak_cn0_drop and
+/// weak_cn0_width, against `free_cn0_dbhz`). Then least squares over all ranges, the place `known` before and the
+/// height alternate with a judgement of each range by its residual, as in expectation maximization (Dempster, Laird and
+/// Rubin 1977), a fixed number of rounds. The judgement takes the residual's variance to be larger by that of the
+/// place: softer than the exact step. `known` is not part of the result: that is the likelihood of the ranges, with at
+/// least 100 m where they say nothing.
 ///
 /// Nothing where fewer than 2 satellites share a clock.
 std::optional<RelativePlace> range_fix(const std::vector<SatelliteObservation>& satellites, double free_cn0_dbhz,

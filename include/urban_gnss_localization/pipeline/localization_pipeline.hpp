@@ -192,6 +192,8 @@ class LocalizationPipeline {
   bool process_next_fix();
   /// The satellites of the fix at `stamp`; nothing where there are none.
   const std::vector<SatelliteObservation>* satellites_of(Stamp stamp) const;
+  /// The same for a fix that is processed now; remembers whether there were any.
+  std::vector<SatelliteObservation> take_satellites_of(Stamp fix_stamp);
   void initialize_with(const PendingFix& pending);
   void remember_for_start(const PendingFix& pending);
   bool try_start(const PendingFix& pending);
@@ -242,8 +244,8 @@ class LocalizationPipeline {
   std::deque<BiasEstimate> biases_;
   double last_radius_m_{0.0};
   std::deque<std::pair<Stamp, std::vector<SatelliteObservation>>> satellites_;
-  bool fixes_have_satellites_{false};    ///< the last one had
-  std::optional<Stamp> last_corrected_;  ///< fix that the localizer took
+  bool fixes_have_satellites_{false};  ///< the last one had
+  std::optional<Stamp> last_taken_;    ///< fix whose satellites were looked for
 
   bool initialized_{false};
   bool lost_{false};
