@@ -52,6 +52,7 @@ ABLATIONS = {
     "learnt scale": ["fix_scale_rate=0.0"],
     "formal covariance, learnt scale": ["use_fix_covariance=false", "direct_sigma=10.0", "shadow_sigma=10.0",
                                         "fix_scale_rate=0.0"],
+    "ranges of the fix": ["use_ranges=false"],
     "velocity of the receiver": ["use_gps_velocity=false"],
     "heavy tails of the velocity": ["velocity_dof=1.0e+9"],
     "correlation of errors": ["fix_correlation_time=0.0", "parked_correlation_time=0.0"],

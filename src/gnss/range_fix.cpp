@@ -94,18 +94,22 @@ class RangeSystem {
 
   /// Maximization: the normal equations, where every range counts as both kinds by its probability.
   void weigh() {
-    Eigen::VectorXd weight(h_.rows());
-    Eigen::VectorXd target(h_.rows());
-    for (Eigen::Index i = 0; i < h_.rows(); ++i) {
-      const SatelliteRange& range = ranges_[static_cast<std::size_t>(i)];
-      const double by_reflection = reflected_[i] / range.reflected_variance_m2;
-      weight[i] = (1.0 - reflected_[i]) / direct_variance_m2_ + by_reflection;
-      target[i] = range.residual_m - by_reflection * range.reflected_m / weight[i];
-    }
-    const Eigen::MatrixXd weighted = weight.asDiagonal() * h_;
-    normal_ = h_.transpose() * weighted;
-    normal_(kHeight, kHeight) += height_information_;
-    right_ = weighted.transpose() * target;
+    set_normal([&](const SatelliteRange& range, double reflected) {
+      const double by_reflection = reflected / range.reflected_variance_m2;
+      const double weight = (1.0 - reflected) / direct_variance_m2_ + by_reflection;
+      return WeighedRange{range.residual_m - by_reflection * range.reflected_m / weight, weight};
+    });
+  }
+
+  /// The same where every range counts as one Gaussian, with the mean and variance of both kinds together: where it is
+  /// open which it is, it says little.
+  void weigh_by_moments() {
+    set_normal([&](const SatelliteRange& range, double reflected) {
+      const double direct = 1.0 - reflected;
+      const double variance = direct * direct_variance_m2_ + reflected * range.reflected_variance_m2 +
+                              direct * reflected * range.reflected_m * range.reflected_m;
+      return WeighedRange{range.residual_m - reflected * range.reflected_m, 1.0 / variance};
+    });
   }
 
   /// Expectation: which ranges are reflected, given the solution of the normal equations and what is known.
@@ -145,6 +149,26 @@ class RangeSystem {
   }
 
  private:
+  struct WeighedRange {
+    double residual_m;
+    double weight;
+  };
+
+  template <class Weigh>
+  void set_normal(const Weigh& weigh) {
+    Eigen::VectorXd weight(h_.rows());
+    Eigen::VectorXd target(h_.rows());
+    for (Eigen::Index i = 0; i < h_.rows(); ++i) {
+      const WeighedRange weighed = weigh(ranges_[static_cast<std::size_t>(i)], reflected_[i]);
+      weight[i] = weighed.weight;
+      target[i] = weighed.residual_m;
+    }
+    const Eigen::MatrixXd weighted = weight.asDiagonal() * h_;
+    normal_ = h_.transpose() * weighted;
+    normal_(kHeight, kHeight) += height_information_;
+    right_ = weighted.transpose() * target;
+  }
+
   const std::vector<SatelliteRange>& ranges_;
   double direct_variance_m2_;
   double height_information_;
@@ -187,7 +211,7 @@ std::optional<RelativePlace> range_fix(const std::vector<SatelliteObservation>& 
     system.weigh();
     system.judge(certain);
   }
-  system.weigh();
+  system.weigh_by_moments();
   const RelativePlace place = system.place();
   // Ranges of micrometres leave nothing but rounding errors of a direction of which they say nothing.
   const bool is_positive_definite = place.covariance(0, 0) > 0.0 && place.covariance.determinant() > 0.0;

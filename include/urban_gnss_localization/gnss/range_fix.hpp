@@ -17,16 +17,16 @@ namespace urban_gnss {
 struct RangeFixParameters {
   bool use_ranges{true};        ///< the ranges of a fix in place of the fix, where the receiver reports their residuals
   double range_sigma{5.0};      ///< m, of a range in line of sight, before anything is learnt: noise, multipath, orbits
-  double range_sigma_min{1.0};  ///< m, the least that it can be learnt to be,
+  double range_sigma_min{0.6};  ///< m, the least that it can be learnt to be,
   double range_sigma_max{8.0};  ///< m, and the most: larger errors are those of reflections
   double reflected_range{18.0};  ///< m, mean by which a range is too long that is not in line of sight, at 37 degrees
-  double reflected_range_sigma{14.0};        ///< m, about that mean
+  double reflected_range_sigma{15.0};        ///< m, about that mean
   double reflected_elevation_exponent{0.7};  ///< both grow with this power of 1 / sin(elevation)
   double weak_cn0_drop{14.0};                ///< dB below a free signal at which one is as likely reflected as direct
-  double weak_cn0_width{4.0};                ///< dB, that change these odds by e
+  double weak_cn0_width{2.5};                ///< dB, that change these odds by e
   double antenna_cn0_rise{10.0};             ///< dB, of a free signal's C/N0 from the horizon to the zenith
   double range_height_sigma{30.0};           ///< m, of the receiver's own height
-  double range_correlation_time{6.0};        ///< s, over which the error of ranges stays the same
+  double range_correlation_time{7.0};        ///< s, over which the error of ranges stays the same
   double range_bias_odds{0.03};              ///< factor on the odds of a bias of a fix whose ranges are known
 
   template <class V>
@@ -86,8 +86,9 @@ struct RelativePlace {
 /// weak_cn0_width, against `free_cn0_dbhz`). Then least squares over all ranges, the place `known` before and the
 /// height alternate with a judgement of each range by its residual, as in expectation maximization (Dempster, Laird and
 /// Rubin 1977), a fixed number of rounds. The judgement takes the residual's variance to be larger by that of the
-/// place: softer than the exact step. `known` is not part of the result: that is the likelihood of the ranges, with at
-/// least 100 m where they say nothing.
+/// place: softer than the exact step. In the end each range counts as one Gaussian with the moments of both kinds, so
+/// that what is left open makes the covariance larger. `known` is not part of the result: that is the likelihood of the
+/// ranges, with at least 100 m where they say nothing.
 ///
 /// Nothing where fewer than 2 satellites share a clock.
 std::optional<RelativePlace> range_fix(const std::vector<SatelliteObservation>& satellites, double free_cn0_dbhz,
