@@ -95,7 +95,7 @@ TEST_P(RangeLocalizers, SeeThroughABiasThatTheRangesReveal) {
 
 TEST_P(RangeLocalizers, HoldOnWhereSomeFixesHaveNone) {
   RangeDrive d;
-  d.no_satellites_share = 0.3;
+  d.no_satellites_share = 0.15;
   EXPECT_LT(result_of("{}", d).worst_m, 6.5);
   EXPECT_GT(result_of("use_ranges: false", d).worst_m, 8.0);
 }

@@ -26,7 +26,7 @@ struct RangeFixParameters {
   double weak_cn0_width{2.5};                ///< dB, that change these odds by e
   double antenna_cn0_rise{10.0};             ///< dB, of a free signal's C/N0 from the horizon to the zenith
   double range_height_sigma{30.0};           ///< m, of the receiver's own height
-  double range_correlation_time{7.0};        ///< s, over which the error of ranges stays the same
+  double range_correlation_time{6.0};        ///< s, over which the error of ranges stays the same
   double range_bias_odds{0.03};              ///< factor on the odds of a bias of a fix whose ranges are known
 
   template <class V>
