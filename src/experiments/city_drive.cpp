@@ -18,20 +18,6 @@ PointCloud to_point_cloud(const LidarScan& scan) {
   return cloud;
 }
 
-std::vector<SatelliteObservation> to_observations(const std::vector<SatelliteReport>& reports) {
-  std::vector<SatelliteObservation> observations;
-  for (const SatelliteReport& report : reports) {
-    SatelliteObservation observation;
-    observation.id = report.id;
-    observation.look = report.look;
-    observation.cn0_dbhz = report.cn0_dbhz;
-    observation.tracked = report.is_tracked;
-    observation.residual_m = report.residual_m;
-    observations.push_back(observation);
-  }
-  return observations;
-}
-
 /// Sorts the simulator's events, and holds back clouds and epochs until odometry has reached them.
 class Dispatcher {
  public:
@@ -116,6 +102,20 @@ class Dispatcher {
 };
 
 }  // namespace
+
+std::vector<SatelliteObservation> to_observations(const std::vector<SatelliteReport>& reports) {
+  std::vector<SatelliteObservation> observations;
+  for (const SatelliteReport& report : reports) {
+    SatelliteObservation observation;
+    observation.id = report.id;
+    observation.look = report.look;
+    observation.cn0_dbhz = report.cn0_dbhz;
+    observation.tracked = report.is_tracked;
+    observation.residual_m = report.residual_m;
+    observations.push_back(observation);
+  }
+  return observations;
+}
 
 Eigen::Isometry3d to_isometry(const Pose2& pose) {
   Eigen::Isometry3d isometry = Eigen::Isometry3d::Identity();

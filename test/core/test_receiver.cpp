@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "receiver_rig.hpp"
+#include "urban_gnss_localization/experiments/city_drive.hpp"
 #include "urban_gnss_localization/gnss/range_fix.hpp"
 #include "urban_gnss_localization/simulation/receiver.hpp"
 
@@ -136,20 +137,6 @@ TEST(Receiver, SeedDecidesAndSatellitesDoNotDisturbEachOther) {
   EXPECT_NE(errors(1, 14), errors(2, 14));
 }
 
-std::vector<SatelliteObservation> as_reported(const ReceiverEpoch& epoch) {
-  std::vector<SatelliteObservation> observations;
-  for (const SatelliteReport& report : epoch.satellites) {
-    SatelliteObservation observation;
-    observation.id = report.id;
-    observation.look = report.look;
-    observation.cn0_dbhz = report.cn0_dbhz;
-    observation.tracked = report.is_tracked;
-    observation.residual_m = report.residual_m;
-    observations.push_back(observation);
-  }
-  return observations;
-}
-
 /// A smoothed fix, and one that is not, some way off: the residuals are those of what is published.
 TEST(Receiver, ResidualsLeadFromTheFixToTheTruth) {
   for (const double smoothing_time : {0.0, 8.0}) {
@@ -168,7 +155,7 @@ TEST(Receiver, ResidualsLeadFromTheFixToTheTruth) {
       if (smoothing_time > 0.0) {
         EXPECT_GT(error.norm(), 30.0);
       }
-      const auto observations = as_reported(epoch);
+      const auto observations = to_observations(epoch.satellites);
       FreeSignalLevel level;
       level.add(observations, {});
       RangeFixParameters p;

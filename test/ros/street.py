@@ -79,8 +79,8 @@ class Street:
             for topic, kind, store in (("gps/fix_weighted", NavSatFix, self.weighted[node]),
                                        ("gps/visibility", Visibility, self.visibilities[node])):
                 rospy.Subscriber(node + "/" + topic, kind, self._on_message, store, queue_size=1000, tcp_nodelay=True)
-        self.await_(lambda: all(p.get_num_connections() >= len(nodes) for p in self.publishers.values()),
-                    "the nodes to subscribe")
+        ends = list(self.publishers.values()) + [self.static.pub_tf]  # a node that has no static transform yet makes no map
+        self.await_(lambda: all(end.get_num_connections() >= len(nodes) for end in ends), "the nodes to subscribe")
 
     def _on_message(self, message, store):
         with self.news:

@@ -44,6 +44,9 @@ struct DriveRecord {
   Trajectory odometry;  ///< base_link, odometry frame
 };
 
+/// What a receiver reports of its satellites, without the truth about them.
+std::vector<SatelliteObservation> to_observations(const std::vector<SatelliteReport>& reports);
+
 /// A planar pose as a transform in space.
 Eigen::Isometry3d to_isometry(const Pose2& pose);
 
