@@ -7,28 +7,17 @@
 #include <numeric>
 #include <set>
 
+#include "reception.hpp"
 #include "urban_gnss_localization/geometry/angles.hpp"
 #include "urban_gnss_localization/gnss/dilution_of_precision.hpp"
 
 namespace urban_gnss {
 namespace {
 
-constexpr double kReferenceSine = 0.6;  ///< of the elevation, 37 degrees
 constexpr double kReferenceCotangent = 4.0 / 3.0;
 const double kReferenceElevation_rad = std::asin(kReferenceSine);
 constexpr double kLowestElevation_rad = 15.0 * kPi / 180.0;  ///< from which reflections grow no more
 constexpr double kMaxCn0_dbhz = 70.0;
-constexpr double kMaxLogOdds = 30.0;
-
-double log_odds(double probability) { return std::log(probability / (1.0 - probability)); }
-
-double probability_of(double log_odds) {
-  return 1.0 / (1.0 + std::exp(-std::clamp(log_odds, -kMaxLogOdds, kMaxLogOdds)));
-}
-
-bool has_cn0(const SatelliteObservation& satellite) {
-  return std::isfinite(satellite.cn0_dbhz) && satellite.cn0_dbhz > 0.0;  // receivers say 0 where they do not know
-}
 
 /// Shares of blocked, free and unknown rays; they sum to 1.
 struct RayShares {
@@ -139,7 +128,8 @@ std::vector<RangingSatellite> ranging(const std::vector<SatelliteObservation>& s
   std::vector<RangingSatellite> result;
   result.reserve(which.size());
   for (const std::size_t i : which) {
-    result.push_back({line_of_sight(satellites[i].look), static_cast<int>(clock_of(satellites[i].id.constellation)), 1.0});
+    result.push_back(
+        {line_of_sight(satellites[i].look), static_cast<int>(clock_of(satellites[i].id.constellation)), 1.0});
   }
   return result;
 }

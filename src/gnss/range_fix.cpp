@@ -5,14 +5,14 @@
 #include <cmath>
 #include <map>
 
+#include "reception.hpp"
+
 namespace urban_gnss {
 namespace {
 
-constexpr double kReferenceSine = 0.6;  ///< of the elevation, 37 degrees
 constexpr double kLowestSine = 0.1;
 constexpr double kFreeShare = 0.9;  ///< quantile of C/N0 that free signals have
 constexpr double kMostCertain = 0.98;
-constexpr double kMaxLogOdds = 30.0;
 constexpr double kFarthest_m = 100.0;
 constexpr double kLeastSigma_m = 1e-3;
 constexpr double kMaxResidual_m = 1e5;  ///< beyond it, a driver's invention
@@ -28,7 +28,7 @@ double levelled_cn0_dbhz(const SatelliteObservation& satellite, const RangeFixPa
 
 bool has_signal(const SatelliteObservation& satellite) {
   return satellite.tracked && std::isfinite(satellite.look.azimuth_rad) && satellite.look.elevation_rad >= 0.0 &&
-         std::isfinite(satellite.look.elevation_rad) && std::isfinite(satellite.cn0_dbhz) && satellite.cn0_dbhz > 0.0;
+         std::isfinite(satellite.look.elevation_rad) && has_cn0(satellite);
 }
 
 struct SatelliteRange {
@@ -54,8 +54,7 @@ std::vector<SatelliteRange> ranges_of(const std::vector<SatelliteObservation>& s
     const Constellation clock = clock_of(id.constellation);
     if (sharing[clock] < 2) continue;  // alone, it only tells its clock
     const double weaker_db = free_cn0_dbhz - levelled_cn0_dbhz(each, p);
-    const double log_odds = std::clamp((weaker_db - p.weak_cn0_drop) / p.weak_cn0_width, -kMaxLogOdds, kMaxLogOdds);
-    const double reflected = 1.0 / (1.0 + std::exp(-log_odds));
+    const double reflected = probability_of((weaker_db - p.weak_cn0_drop) / p.weak_cn0_width);
     const double larger = std::pow(kReferenceSine / std::max(std::sin(each.look.elevation_rad), kLowestSine),
                                    p.reflected_elevation_exponent);
     ranges.push_back({clock, line_of_sight(each.look), each.residual_m,
@@ -126,10 +125,9 @@ class RangeSystem {
       const SatelliteRange& range = ranges_[static_cast<std::size_t>(i)];
       const double error = range.residual_m - h_.row(i).dot(solution);
       const double variance = h_.row(i) * covariance * h_.row(i).transpose();
-      const double log_odds = std::log(range.reflected_before / (1.0 - range.reflected_before)) +
-                              log_gaussian(error - range.reflected_m, range.reflected_variance_m2 + variance) -
-                              log_gaussian(error, direct_variance_m2_ + variance);
-      reflected_[i] = 1.0 / (1.0 + std::exp(-std::clamp(log_odds, -kMaxLogOdds, kMaxLogOdds)));
+      reflected_[i] = probability_of(log_odds(range.reflected_before) +
+                                     log_gaussian(error - range.reflected_m, range.reflected_variance_m2 + variance) -
+                                     log_gaussian(error, direct_variance_m2_ + variance));
     }
   }
 
