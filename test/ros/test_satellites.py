@@ -3,8 +3,6 @@
 import math
 import os
 import sys
-import threading
-import unittest
 
 import numpy as np
 import rospy
@@ -15,6 +13,7 @@ from urban_gnss_localization.msg import LocalizationStatus, Satellite, Satellite
 
 sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
 from drive import make_fix  # noqa: E402
+from localizer_case import LocalizerCase  # noqa: E402
 
 SPEED, YAW_RATE = 2.0, 0.1  # m/s, rad/s
 SECONDS, SETTLED = 30, 15   # of the drive; from when on it is judged
@@ -71,25 +70,7 @@ def odometry(stamp, pose):
     return message
 
 
-class SatellitesTest(unittest.TestCase):
-    def setUp(self):
-        self.changed = threading.Condition()
-        self.status, self.estimate = None, None
-
-    def on_status(self, message):
-        with self.changed:
-            self.status = message
-            self.changed.notify_all()
-
-    def on_estimate(self, message):
-        with self.changed:
-            self.estimate = message
-            self.changed.notify_all()
-
-    def wait(self, condition, what):
-        with self.changed:
-            self.assertTrue(self.changed.wait_for(condition, 10.0), what)
-
+class SatellitesTest(LocalizerCase):
     def drive(self, namespace, late=0, stamped_late_s=0.0):
         """Satellites come `late` messages of odometry after their fix (0: before it), their stamps that much too late.
         Returns the largest error of the estimate and the mean one of the fixes (m), and how many of them had ranges."""
@@ -98,10 +79,7 @@ class SatellitesTest(unittest.TestCase):
         odometries, fixes, skies = publishers = [
             rospy.Publisher(namespace + "/" + topic, kind, queue_size=1000, tcp_nodelay=True)
             for topic, kind in (("odom", Odometry), ("gps/fix", NavSatFix), ("gps/satellites", SatelliteArray))]
-        deadline = rospy.Time.now() + rospy.Duration(10.0)
-        while not all(end.get_num_connections() for end in publishers + subscribers):
-            self.assertLess(rospy.Time.now(), deadline, "no connection")
-            rospy.sleep(0.01)
+        self.connect(publishers + subscribers)
         noise = np.random.RandomState(1)
         worst, biases = 0.0, []
         for k in range(SECONDS * ODOMETRY_PER_FIX):

@@ -1,14 +1,17 @@
 #!/usr/bin/env python3
 """gps/velocity live: both types of messages reach the localizer and tell it the heading; another type does no harm."""
 import math
-import threading
-import unittest
+import os
+import sys
 
 import rospy
 import rostest
 from geometry_msgs.msg import TwistStamped, TwistWithCovarianceStamped, Vector3Stamped
 from nav_msgs.msg import Odometry
 from urban_gnss_localization.msg import LocalizationStatus
+
+sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
+from localizer_case import LocalizerCase  # noqa: E402
 
 YAW = 0.4      # rad, true, where the localizer starts at 0 +- 0.5
 SPEED = 2.0    # m/s
@@ -39,25 +42,7 @@ def odometry(stamp, x):
     return message
 
 
-class VelocityTest(unittest.TestCase):
-    def setUp(self):
-        self.changed = threading.Condition()
-        self.used, self.estimate = None, None
-
-    def on_status(self, message):
-        with self.changed:
-            self.used = message.velocities_used
-            self.changed.notify_all()
-
-    def on_estimate(self, message):
-        with self.changed:
-            self.estimate = message
-            self.changed.notify_all()
-
-    def wait(self, condition, what):
-        with self.changed:
-            self.assertTrue(self.changed.wait_for(condition, 10.0), what)
-
+class VelocityTest(LocalizerCase):
     def drive(self, kind, namespace):
         """Drives straight on; returns the last estimate and how many velocities were used."""
         self.estimate = None
@@ -65,10 +50,7 @@ class VelocityTest(unittest.TestCase):
                        rospy.Subscriber(namespace + "/odometry/filtered", Odometry, self.on_estimate, queue_size=1000)]
         odometries = rospy.Publisher(namespace + "/odom", Odometry, queue_size=1000)
         velocities = rospy.Publisher(namespace + "/gps/velocity", kind, queue_size=1000)
-        deadline = rospy.Time.now() + rospy.Duration(10.0)
-        while not all(end.get_num_connections() for end in [odometries, velocities] + subscribers):
-            self.assertLess(rospy.Time.now(), deadline, "no connection")
-            rospy.sleep(0.01)
+        self.connect([odometries, velocities] + subscribers)
         for k in range(ODOMETRY + 1):
             stamp = rospy.Time.from_sec(1000.0 + 0.1 * k)
             if k % EVERY == 0:
@@ -76,12 +58,12 @@ class VelocityTest(unittest.TestCase):
             odometries.publish(odometry(stamp, 0.1 * SPEED * k))
             # One message at a time: no queue is long enough for a machine that is slow enough.
             self.wait(lambda: self.estimate is not None and self.estimate.header.stamp >= stamp, "no estimate")
-        self.used = None
-        self.wait(lambda: self.used is not None, "no status")
+        self.status = None
+        self.wait(lambda: self.status is not None, "no status")
         for subscriber in subscribers:
             subscriber.unregister()
         orientation = self.estimate.pose.pose.orientation
-        return 2.0 * math.atan2(orientation.z, orientation.w), self.used
+        return 2.0 * math.atan2(orientation.z, orientation.w), self.status.velocities_used
 
     def test_velocities_of_every_type(self):
         for namespace, kind in (("plain", TwistStamped), ("with_covariance", TwistWithCovarianceStamped)):
