@@ -5,7 +5,7 @@
 #include <benchmark/benchmark.h>
 
 #include "urban_gnss_localization/common/random.hpp"
-#include "urban_gnss_localization/filters/complementary_ekf.hpp"
+#include "urban_gnss_localization/localizers/kim/complementary_ekf.hpp"
 
 namespace urban_gnss {
 namespace {

@@ -7,7 +7,7 @@
 
 #include <vector>
 
-#include "urban_gnss_localization/filters/imm_ekf.hpp"
+#include "urban_gnss_localization/localizers/switching/imm_ekf.hpp"
 #include "urban_gnss_localization/gnss/range_fix.hpp"
 
 namespace urban_gnss {

@@ -5,8 +5,8 @@
 
 #include <benchmark/benchmark.h>
 
-#include "urban_gnss_localization/filters/bias_kalman_filter.hpp"
-#include "urban_gnss_localization/filters/switching_particle_filter.hpp"
+#include "urban_gnss_localization/localizers/nishida/bias_kalman_filter.hpp"
+#include "urban_gnss_localization/localizers/switching/switching_particle_filter.hpp"
 
 namespace urban_gnss {
 namespace {

@@ -4,7 +4,7 @@
 
 #include <benchmark/benchmark.h>
 
-#include "urban_gnss_localization/filters/ukf.hpp"
+#include "urban_gnss_localization/localizers/maier/ukf.hpp"
 
 namespace urban_gnss {
 namespace {

@@ -5,8 +5,8 @@
 #include <memory>
 #include <utility>
 
-#include "urban_gnss_localization/filters/imm_ekf.hpp"
-#include "urban_gnss_localization/filters/switching_particle_filter.hpp"
+#include "urban_gnss_localization/localizers/switching/imm_ekf.hpp"
+#include "urban_gnss_localization/localizers/switching/switching_particle_filter.hpp"
 #include "urban_gnss_localization/pipeline/bias_pipeline.hpp"
 
 namespace urban_gnss {

@@ -6,7 +6,7 @@
 #include <urban_gnss_localization/ComplementaryEkfConfig.h>
 #include <visualization_msgs/MarkerArray.h>
 
-#include "urban_gnss_localization/filters/complementary_ekf.hpp"
+#include "urban_gnss_localization/localizers/kim/complementary_ekf.hpp"
 #include "urban_gnss_localization/ros/localizer_node.hpp"
 #include "urban_gnss_localization/ros/markers.hpp"
 #include "urban_gnss_localization/ros/node_parameters.hpp"

@@ -1,7 +1,7 @@
 // Interacting multiple models of the fixes' bias as a node. Parameters: LocalizerNodeParameters, ImmEkfParameters and
 // MotionParameters; config/imm_ekf.yaml documents the latter two.
 
-#include "urban_gnss_localization/filters/imm_ekf.hpp"
+#include "urban_gnss_localization/localizers/switching/imm_ekf.hpp"
 #include "urban_gnss_localization/ros/localizer_node.hpp"
 #include "urban_gnss_localization/ros/node_parameters.hpp"
 

@@ -1,7 +1,7 @@
 // The particle filters as a node. Parameters: LocalizerNodeParameters, ParticleFilterParameters,
 // MotionParameters, and the two below; config/particle_filter.yaml documents each.
 
-#include "urban_gnss_localization/filters/switching_particle_filter.hpp"
+#include "urban_gnss_localization/localizers/switching/switching_particle_filter.hpp"
 #include "urban_gnss_localization/ros/localizer_node.hpp"
 #include "urban_gnss_localization/ros/node_parameters.hpp"
 #include "urban_gnss_localization/ros/topics.hpp"

@@ -14,10 +14,10 @@
 #include <cmath>
 #include <map>
 
-#include "urban_gnss_localization/ros/city_markers.hpp"
+#include "urban_gnss_localization/simulation_ros/city_markers.hpp"
 #include "urban_gnss_localization/ros/markers.hpp"
 #include "urban_gnss_localization/ros/node_parameters.hpp"
-#include "urban_gnss_localization/ros/simulation_messages.hpp"
+#include "urban_gnss_localization/simulation_ros/simulation_messages.hpp"
 #include "urban_gnss_localization/simulation/city_simulator.hpp"
 #include "urban_gnss_localization/simulation/paper_field_simulator.hpp"
 

@@ -1,7 +1,7 @@
 // The unscented Kalman filter of Maier and Kleiner as a node. Parameters: LocalizerNodeParameters, UkfParameters and
 // MotionParameters; config/ukf.yaml documents the latter two.
 
-#include "urban_gnss_localization/filters/ukf.hpp"
+#include "urban_gnss_localization/localizers/maier/ukf.hpp"
 #include "urban_gnss_localization/ros/localizer_node.hpp"
 #include "urban_gnss_localization/ros/node_parameters.hpp"
 

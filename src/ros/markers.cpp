@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "marker_parts.hpp"
+#include "urban_gnss_localization/ros/marker_parts.hpp"
 #include "urban_gnss_localization/ros/conversions.hpp"
 
 namespace urban_gnss {

@@ -16,7 +16,7 @@ namespace urban_gnss {
 void run_plotter(const std::string& script, const std::string& directory) {
   namespace fs = std::filesystem;
   const fs::path package = ros::package::getPath("urban_gnss_localization");
-  const fs::path path = package / "scripts" / script;
+  const fs::path path = package / "reports" / script;
   if (package.empty() || !fs::exists(path)) {
     throw std::runtime_error(script + ": not found; source the workspace's setup.bash so that the package is found");
   }

@@ -4,7 +4,7 @@
 
 #include <cstdint>
 
-#include "marker_parts.hpp"
+#include "urban_gnss_localization/ros/marker_parts.hpp"
 
 namespace urban_gnss {
 

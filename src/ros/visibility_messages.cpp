@@ -9,7 +9,7 @@
 #include <limits>
 #include <stdexcept>
 
-#include "marker_parts.hpp"
+#include "urban_gnss_localization/ros/marker_parts.hpp"
 #include "visibility_colours.hpp"
 
 namespace urban_gnss {

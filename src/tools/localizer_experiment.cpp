@@ -18,10 +18,10 @@
 #include "output_file.hpp"
 #include "parallel_jobs.hpp"
 #include "urban_gnss_localization/evaluation/report_json.hpp"
-#include "urban_gnss_localization/filters/complementary_ekf.hpp"
-#include "urban_gnss_localization/filters/imm_ekf.hpp"
-#include "urban_gnss_localization/filters/switching_particle_filter.hpp"
-#include "urban_gnss_localization/filters/ukf.hpp"
+#include "urban_gnss_localization/localizers/kim/complementary_ekf.hpp"
+#include "urban_gnss_localization/localizers/switching/imm_ekf.hpp"
+#include "urban_gnss_localization/localizers/switching/switching_particle_filter.hpp"
+#include "urban_gnss_localization/localizers/maier/ukf.hpp"
 #include "urban_gnss_localization/geometry/angles.hpp"
 
 namespace fs = std::filesystem;

@@ -5,10 +5,10 @@
 #include <vector>
 
 #include "urban_gnss_localization/common/parameters.hpp"
-#include "urban_gnss_localization/filters/complementary_ekf.hpp"
-#include "urban_gnss_localization/filters/imm_ekf.hpp"
-#include "urban_gnss_localization/filters/switching_particle_filter.hpp"
-#include "urban_gnss_localization/filters/ukf.hpp"
+#include "urban_gnss_localization/localizers/kim/complementary_ekf.hpp"
+#include "urban_gnss_localization/localizers/switching/imm_ekf.hpp"
+#include "urban_gnss_localization/localizers/switching/switching_particle_filter.hpp"
+#include "urban_gnss_localization/localizers/maier/ukf.hpp"
 #include "urban_gnss_localization/ros/localizer_node.hpp"
 #include "urban_gnss_localization/ros/topics.hpp"
 

@@ -16,7 +16,7 @@
 #include "find_scenario.hpp"
 #include "output_file.hpp"
 #include "urban_gnss_localization/common/progress.hpp"
-#include "urban_gnss_localization/ros/simulation_messages.hpp"
+#include "urban_gnss_localization/simulation_ros/simulation_messages.hpp"
 #include "urban_gnss_localization/simulation/city_simulator.hpp"
 #include "urban_gnss_localization/simulation/paper_field_simulator.hpp"
 #include "urban_gnss_localization/simulation/simulation_statistics.hpp"

@@ -9,7 +9,7 @@ import unittest
 
 import numpy as np
 
-SCRIPTS = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "scripts")
+SCRIPTS = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "reports")
 SCRIPT = os.path.join(SCRIPTS, "compare_localizers.py")
 sys.path.insert(0, SCRIPTS)
 spec = importlib.util.spec_from_file_location("compare_localizers", SCRIPT)

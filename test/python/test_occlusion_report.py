@@ -7,7 +7,7 @@ import tempfile
 import unittest
 
 PROGRAMS = os.environ.get("URBAN_GNSS_PROGRAMS", "")
-SCRIPT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "scripts", "occlusion_report.py")
+SCRIPT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "reports", "occlusion_report.py")
 
 
 def report(*arguments):

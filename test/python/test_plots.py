@@ -11,7 +11,7 @@ import unittest
 import matplotlib.image
 import numpy as np
 
-SCRIPTS = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "scripts")
+SCRIPTS = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "reports")
 PNG_OF_PAPER = ("fig7_particles.png", "fig8_trajectories.png", "fig9_errors.png", "errors_over_seeds.png",
                 "summary.png")
 

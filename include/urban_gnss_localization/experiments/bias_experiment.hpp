@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "urban_gnss_localization/evaluation/trajectory.hpp"
-#include "urban_gnss_localization/filters/complementary_ekf.hpp"
+#include "urban_gnss_localization/localizers/kim/complementary_ekf.hpp"
 #include "urban_gnss_localization/pipeline/localization_pipeline.hpp"
 #include "urban_gnss_localization/simulation/scenario.hpp"
 

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "urban_gnss_localization/evaluation/trajectory_errors.hpp"
-#include "urban_gnss_localization/filters/bias_kalman_filter.hpp"
-#include "urban_gnss_localization/filters/localizer.hpp"
+#include "urban_gnss_localization/localizers/nishida/bias_kalman_filter.hpp"
+#include "urban_gnss_localization/localizers/localizer.hpp"
 #include "urban_gnss_localization/pipeline/localization_pipeline.hpp"
 #include "urban_gnss_localization/pipeline/occlusion_pipeline.hpp"
 #include "urban_gnss_localization/simulation/scenario.hpp"

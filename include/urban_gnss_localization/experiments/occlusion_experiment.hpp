@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "urban_gnss_localization/evaluation/trajectory.hpp"
-#include "urban_gnss_localization/filters/ukf.hpp"
+#include "urban_gnss_localization/localizers/maier/ukf.hpp"
 #include "urban_gnss_localization/pipeline/localization_pipeline.hpp"
 #include "urban_gnss_localization/pipeline/occlusion_pipeline.hpp"
 #include "urban_gnss_localization/simulation/scenario.hpp"

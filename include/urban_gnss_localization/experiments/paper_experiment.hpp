@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "urban_gnss_localization/control/waypoint_controller.hpp"
-#include "urban_gnss_localization/filters/bias_kalman_filter.hpp"
-#include "urban_gnss_localization/filters/particle_filter.hpp"
+#include "urban_gnss_localization/localizers/nishida/bias_kalman_filter.hpp"
+#include "urban_gnss_localization/localizers/nishida/particle_filter.hpp"
 #include "urban_gnss_localization/simulation/paper_field.hpp"
 
 namespace urban_gnss {

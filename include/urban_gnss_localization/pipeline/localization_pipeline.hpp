@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "urban_gnss_localization/filters/bias_kalman_filter.hpp"
-#include "urban_gnss_localization/filters/localizer.hpp"
+#include "urban_gnss_localization/localizers/nishida/bias_kalman_filter.hpp"
+#include "urban_gnss_localization/localizers/localizer.hpp"
 #include "urban_gnss_localization/gnss/datum_initializer.hpp"
 #include "urban_gnss_localization/gnss/fix_sanitation.hpp"
 #include "urban_gnss_localization/gnss/heading_initializer.hpp"

@@ -19,8 +19,8 @@
 #include <vector>
 
 #include "urban_gnss_localization/evaluation/trajectory.hpp"
-#include "urban_gnss_localization/filters/bias_kalman_filter.hpp"
-#include "urban_gnss_localization/filters/particle_set.hpp"
+#include "urban_gnss_localization/localizers/nishida/bias_kalman_filter.hpp"
+#include "urban_gnss_localization/localizers/particle_set.hpp"
 #include "urban_gnss_localization/pipeline/localization_pipeline.hpp"
 
 /// Between messages and the core's types. Nothing here decides or computes anything of its own.

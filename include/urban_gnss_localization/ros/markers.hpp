@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "urban_gnss_localization/filters/bias_kalman_filter.hpp"
+#include "urban_gnss_localization/localizers/nishida/bias_kalman_filter.hpp"
 #include "urban_gnss_localization/geometry/pose2.hpp"
 
 namespace urban_gnss {

@@ -1,0 +1,194 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "urban_gnss_localization/localizers/kim/bias_detector.hpp"
+#include "urban_gnss_localization/localizers/nishida/bias_kalman_filter.hpp"
+#include "urban_gnss_localization/motion/dead_reckoning.hpp"
+#include "urban_gnss_localization/localizers/kim/fix_noise_monitor.hpp"
+#include "urban_gnss_localization/localizers/localizer.hpp"
+#include "urban_gnss_localization/localizers/kim/two_stage_filter.hpp"
+#include "urban_gnss_localization/gnss/heading_initializer.hpp"
+
+namespace urban_gnss {
+
+enum class ComplementaryMode {
+  kStandard,     ///< the paper's conventional filter (section 2.3): every fix as it is, with its declared covariance
+  kGated,        ///< the same, but a fix whose NIS is above its quantile is rejected
+  kCompensated,  ///< the paper's: its bias is estimated; the noise of the fixes is taken as they show it
+};
+EnumNames<ComplementaryMode> enum_names(ComplementaryMode);
+
+/// What happens when the fixes contradict the estimate for long (F3).
+enum class LockoutPolicy {
+  kAutomatic,      ///< after lockout_timeout the estimate is what is wrong: its position starts anew on the fixes
+  kDeadReckoning,  ///< the odometry is believed until a fix agrees with it again, or a pose is set
+};
+EnumNames<LockoutPolicy> enum_names(LockoutPolicy);
+
+struct ComplementaryEkfParameters {
+  ComplementaryMode mode{ComplementaryMode::kCompensated};
+  /// Standard and gated too take the noise as the fixes show it, and (gated) find ramps; false: the paper's
+  /// conventional filter (section 2.3), which believes what a fix declares.
+  bool adapt_every_mode{true};
+  double fix_bias_sigma{20.0};     ///< m per axis, M0: the bias when its filter opens
+  double fix_bias_time{30.0};      ///< s, time after which a bias has faded; with fix_bias_sigma this gives Q_b
+  double close_probability{0.95};  ///< a bias inside this quantile is insignificant
+  int close_count{5};              ///< count of fixes in a row with an insignificant bias after which the filter closes
+  double detection_horizon{
+      10.0};  ///< s of odometry after which the tests' covariance grows no more while fixes are doubted
+  /// s, correlation time of a fix's error while the robot stands: reflections change little then (F34)
+  double parked_correlation_time{150.0};
+  LockoutPolicy lockout_policy{LockoutPolicy::kAutomatic};
+  double lockout_timeout{20.0};     ///< s of nothing but rejected fixes
+  double bias_open_timeout{120.0};  ///< s of an open bias filter
+  double lockout_gap{5.0};          ///< s without a fix that end such a run: what comes after a blackout counts anew
+  BiasDetectorParameters detector;
+  FixNoiseParameters fix_noise;
+  DeadReckoningParameters odometry;
+
+  template <class V>
+  void visit(V& v) {
+    v("mode", mode);
+    v("adapt_every_mode", adapt_every_mode);
+    v("fix_bias_sigma", fix_bias_sigma, positive());
+    v("fix_bias_time", fix_bias_time, positive());
+    v("close_probability", close_probability, between(0.01, 0.999999));
+    v("close_count", close_count, between(1, 10000));
+    v("detection_horizon", detection_horizon, non_negative());
+    v("parked_correlation_time", parked_correlation_time, non_negative());
+    v("lockout_policy", lockout_policy);
+    v("lockout_timeout", lockout_timeout, positive());
+    v("bias_open_timeout", bias_open_timeout, positive());
+    v("lockout_gap", lockout_gap, positive());
+    detector.visit(v);
+    fix_noise.visit(v);
+    odometry.visit(v);
+  }
+  void check(std::vector<std::string>& faults) const;
+};
+
+/// The complementary filter of Kim et al. with compensation of the fix's bias (Fig. 4).
+///
+/// The odometry is dead-reckoned (eq. 1-3). At a fix, the difference "fix - dead reckoning" drives a Kalman filter of
+/// the dead reckoning's error, whose estimate is fed back. In `compensated` mode:
+///   1. test the innovation (BiasDetector);
+///   2. where it is taken for biased, open the bias filter: b = 0, covariance M0 (TwoStageFilter);
+///   3. while open, let the bias walk, correct both stages, feed back the compensated error;
+///   4. where the very next fix speaks for no bias, it was a false alarm: go on as if it had not been;
+///   5. close it when the bias has been insignificant for some fixes, or a fix agrees with no bias again at once.
+/// The error states are the pose and, where estimate_odometry_errors, what the odometry is wrong by.
+///
+/// A heading that is wrong by radians is beyond a linearisation: started without a heading, the position follows the
+/// fixes, and the filter starts once HeadingInitializer has found one.
+class ComplementaryEkf : public Localizer {
+ public:
+  /// Requires parameters without faults.
+  explicit ComplementaryEkf(const ComplementaryEkfParameters& parameters);
+
+  const char* name() const override { return "complementary_ekf"; }
+  std::string mode() const override { return enum_name(parameters_.mode); }
+  bool wants_bias() const override { return false; }
+  void initialize(const PoseEstimate& start) override;
+  void move(const Twist2& twist, double duration_s) override;
+  FixVerdict correct(const FixMeasurement& fix) override;
+  Pose2 pose() const override { return pose_; }
+  PoseEstimate estimate() const override;
+  LocalizerHealth health() const override;
+
+  /// Takes effect at the next fix; leaving `compensated` closes the bias filter.
+  void set_mode(ComplementaryMode mode);
+
+  /// The odometry alone since the start, which never jumps, and the correction: correction o dead_reckoned = pose.
+  const Pose2& dead_reckoned() const { return dead_reckoned_; }
+  Pose2 correction() const { return compose(pose_, inverse(dead_reckoned_)); }
+  const OdometryErrors& odometry_errors() const { return errors_; }
+  /// Of the error states, with the bias's share.
+  ErrorCovariance error_covariance() const { return filter_.compensated_covariance(); }
+
+  bool is_bias_open() const { return is_open_; }
+  Eigen::Vector2d bias() const { return filter_.bias(); }
+  Eigen::Matrix2d bias_covariance() const { return filter_.bias_covariance(); }
+  /// Whether the gate cannot find anything, as the NIS runs far below its expectation (F4).
+  bool is_gate_inert() const { return is_inert_; }
+  /// smallest_detectable_jump (m) at the last fix; 0 before the first.
+  double smallest_detectable_jump_m() const;
+
+  /// One for every fix since the last call, as gps/bias says it.
+  std::vector<BiasEstimate> take_bias_estimates();
+
+ private:
+  using Filter = TwoStageFilter<kErrorStates, 2, 2>;
+
+  /// One fix, linearised about the pose.
+  struct Innovation {
+    Eigen::Vector2d value;  ///< m, fix minus predicted antenna, without the bias
+    Filter::Observation observation;
+    Eigen::Matrix2d declared;  ///< m^2
+    Eigen::Matrix2d noise;     ///< m^2, as estimation believes it
+    double time_s;
+  };
+  /// Since when fixes have been doubted without a break.
+  struct Run {
+    double since_s;
+    double last_s;
+    Eigen::Matrix2d covariance;  ///< m^2, of the predicted antenna when it began, grown for detection_horizon
+    bool is_frozen;
+  };
+
+  /// Whether the noise of the fixes is taken as they scatter, and slow drifts of them are looked for.
+  bool is_adaptive() const;
+  /// Factor on the declared covariance, as the fixes scatter and as the robot stands.
+  double noise_inflation() const;
+  /// Without a heading: takes the fix for the position and for the search. True where the heading was found.
+  bool search_heading(const FixMeasurement& fix, const Innovation& innovation);
+  void decide(const Innovation& innovation, FixVerdict& verdict);
+  void decide_compensated(const Innovation& innovation, const BiasDetection& detection, FixVerdict& verdict);
+  void decide_open(const Innovation& innovation, FixVerdict& verdict);
+  void open_or_reject(const Innovation& innovation, FixVerdict& verdict);
+  void reject(const Innovation& innovation, FixVerdict& verdict);
+  /// Whether the first fix after the opening speaks for no bias; ends the bias filter where it does.
+  bool is_false_alarm(const Innovation& innovation, double direct_nis, FixVerdict& verdict);
+  void close();
+  void feed_back();
+  void close_if_insignificant(const Innovation& innovation, FixVerdict& verdict);
+  void apply(const Innovation& innovation);
+  void restart_position(const Innovation& innovation);
+  /// Covariance of the predicted antenna by short-horizon odometry: what the tests use.
+  Eigen::Matrix2d prediction_covariance(const Innovation& innovation) const;
+  void doubt(const Innovation& innovation);
+  double bias_statistic() const;
+  void publish(const FixMeasurement& fix, const Eigen::Vector2d& predicted, const FixVerdict& verdict);
+
+  ComplementaryEkfParameters parameters_;
+  BiasDetector detector_;
+  FixNoiseMonitor noise_monitor_;
+  double close_threshold_;
+  double spike_threshold_;  ///< NIS that is no false alarm
+
+  Pose2 pose_;
+  Pose2 dead_reckoned_;
+  OdometryErrors errors_;
+  /// Of the errors of pose_ and errors_. After each feedback the compensated error is 0.
+  Filter filter_{ErrorState::Zero(), ErrorCovariance::Zero()};
+  Eigen::Vector2d path_{Eigen::Vector2d::Zero()};  ///< m, moved since the start, without corrections
+  double path_variance_m2_{0.0};
+
+  bool is_open_{false};
+  double opened_s_{0.0};
+  double opening_nis_{0.0};
+  bool is_confirmed_{false};  ///< a fix after the opening agreed with the bias
+  double last_fix_s_{0.0};
+  bool had_fix_{false};
+  int insignificant_{0};
+  bool is_inert_{false};
+  std::optional<Run> run_;
+  std::optional<HeadingInitializer> heading_search_;  ///< while the heading is unknown
+  double moved_since_fix_m_{0.0};
+  double elapsed_since_fix_s_{0.0};  ///< of odometry
+  Eigen::Matrix2d last_test_covariance_{Eigen::Matrix2d::Zero()};
+  std::vector<BiasEstimate> bias_estimates_;
+};
+
+}  // namespace urban_gnss

@@ -1,0 +1,121 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+
+#include "urban_gnss_localization/common/parameters.hpp"
+#include "urban_gnss_localization/localizers/localizer.hpp"
+#include "urban_gnss_localization/localizers/maier/unscented.hpp"
+#include "urban_gnss_localization/motion/odometry_errors.hpp"
+
+namespace urban_gnss {
+
+/// What is done with a fix whose normalised innovation is larger than it should be.
+enum class OutlierPolicy {
+  kStudentT,  ///< weighed down, the more the farther it is off
+  kGate,      ///< rejected beyond the chi-squared quantile
+  kNone,      ///< used like any other
+};
+EnumNames<OutlierPolicy> enum_names(OutlierPolicy);
+
+struct UkfParameters {
+  OutlierPolicy outliers{OutlierPolicy::kStudentT};
+  double student_dof{1.0};           ///< degrees of freedom of the Student-t distribution; large ones are Gaussian
+  double gate_probability{0.99};     ///< that a good fix is not called an outlier; 1: none is
+  double gate_timeout{5.0};          ///< s of nothing but rejections after which it restarts on the fix
+  double fix_correlation_time{1.0};  ///< s, over which the error of fixes stays the same; 0: independent errors
+  /// All noise of the odometry is in the motion model, as in the paper.
+  OdometryErrorParameters odometry{0.1, 0.03, 2e-4, 0.005, 3e-5, 0.0, 0.0, 0.03};
+  double ukf_alpha{0.5};  ///< spread of the sigma points
+  double ukf_beta{2.0};   ///< 2 is best for Gaussian errors
+  double ukf_kappa{0.0};  ///< secondary spread
+
+  template <class V>
+  void visit(V& v) {
+    v("outliers", outliers);
+    v("student_dof", student_dof, positive());
+    v("gate_probability", gate_probability, Range{0.0, 1.0, true});
+    v("gate_timeout", gate_timeout, positive());
+    v("fix_correlation_time", fix_correlation_time, non_negative());
+    odometry.visit(v);
+    v("ukf_alpha", ukf_alpha, between(1e-3, 1.0));
+    v("ukf_beta", ukf_beta, non_negative());
+    v("ukf_kappa", ukf_kappa, non_negative());
+  }
+  void check(std::vector<std::string>&) const {}
+};
+
+/// The unscented Kalman filter of Maier and Kleiner 2010, section III-A: x_t = g(x_{t-1}, u_{t-1}) + noise, eq. (1),
+/// z_t = h(x_t) + noise, eq. (2), with the scaled unscented transform.
+///
+/// The state is (x, y, yaw, s, b): the pose, the relative error s of the odometry's speed and the error b of its yaw
+/// rate, so that the robot's speed is (1 + s) v and its yaw rate w + b for the odometry's v and w. Odometry, or a
+/// gyroscope in place of its yaw rate, is the control input u, as in eq. (1). A state with speed and yaw rate, and
+/// odometry as a measurement of them, gives the same pose where odometry is much more frequent and exact than fixes,
+/// and cannot tell a constant error from motion; s and b are slow random walks.
+///
+/// Motion: the noise of Nishida et al. (5)-(7) enters as three more dimensions of the transform (move_noisily()).
+/// Fix: h is the antenna's position, lever arm included. The innovation's NIS is of the fix's own covariance; for the
+/// update, that is multiplied by (1 + a) / (1 - a), a = exp(-interval / fix_correlation_time), by which errors of a
+/// first-order Markov process tell less than independent ones, and divided by the weight of the Student-t distribution,
+/// min(1, (dof + 2) / (dof + NIS)).
+///
+/// Yaws are averaged as differences from the central point that are never wrapped, which is the mean on the circle and
+/// has no ambiguity. Its standard deviation is kept at or below that of an unknown yaw, pi / sqrt(3).
+///
+/// Input that is not finite changes nothing; the covariance is positive definite at all times.
+class Ukf : public Localizer {
+ public:
+  static constexpr int kDimension = 5;
+  using State = Eigen::Matrix<double, kDimension, 1>;
+  using Covariance = Eigen::Matrix<double, kDimension, kDimension>;
+
+  /// Requires parameters without faults.
+  Ukf(const UkfParameters& parameters, const MotionParameters& motion);
+
+  const char* name() const override { return "ukf"; }
+  std::string mode() const override { return enum_name(parameters_.outliers); }
+  bool wants_bias() const override { return false; }
+  /// Throws std::invalid_argument where pose or covariance is not finite. A covariance that is not positive definite is
+  /// replaced by one close to it.
+  void initialize(const PoseEstimate& start) override;
+  /// Leaves out a step that is not finite or not positive in duration.
+  void move(const Twist2& twist, double duration_s) override;
+  /// kRejectedNonFinite for a fix that is not finite or has no positive definite covariance.
+  FixVerdict correct(const FixMeasurement& fix) override;
+  Pose2 pose() const override { return {state_[0], state_[1], state_[2]}; }
+  PoseEstimate estimate() const override { return {pose(), covariance_.topLeftCorner<3, 3>()}; }
+  LocalizerHealth health() const override;
+
+  double speed_scale() const { return state_[3]; }
+  double yaw_rate_bias_radps() const { return state_[4]; }
+  /// x, y, yaw, speed scale, yaw-rate bias; m, m, rad, 1, rad/s.
+  const State& state() const { return state_; }
+  const Covariance& covariance() const { return covariance_; }
+
+ private:
+  /// The fix predicted from the state.
+  struct Prediction {
+    Eigen::Vector2d position;
+    Eigen::Matrix2d covariance;                       ///< without the fix's own
+    Eigen::Matrix<double, kDimension, 2> with_state;  ///< cross-covariance
+  };
+  Prediction predict(const Eigen::Vector2d& antenna_in_body) const;
+  /// Whether the gate rejected the fix, or restarted on it.
+  bool is_settled_by_gate(const FixMeasurement& fix, const Eigen::Vector2d& innovation, FixVerdict& verdict);
+  double correlation_inflation(double time_s) const;
+  /// Takes over a new state; refuses one that is not finite.
+  bool accept(State state, Covariance covariance);
+
+  UkfParameters parameters_;
+  MotionParameters motion_;
+  UnscentedWeights motion_weights_;
+  UnscentedWeights fix_weights_;
+  double nis_threshold_;
+  State state_{State::Zero()};
+  Covariance covariance_{Covariance::Identity()};
+  std::optional<double> last_used_s_;  ///< time of the last fix that was used
+  std::optional<double> rejected_since_s_;
+};
+
+}  // namespace urban_gnss

@@ -1,0 +1,174 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <limits>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "urban_gnss_localization/localizers/switching/bias_modes.hpp"
+#include "urban_gnss_localization/motion/dead_reckoning.hpp"
+#include "urban_gnss_localization/localizers/switching/fix_noise_model.hpp"
+#include "urban_gnss_localization/localizers/localizer.hpp"
+#include "urban_gnss_localization/localizers/switching/velocity_noise.hpp"
+#include "urban_gnss_localization/gnss/range_fix.hpp"
+
+namespace urban_gnss {
+
+/// The model of odometry and receiver that the filters of the switching bias share.
+struct SwitchingModelParameters {
+  FixSigmaParameters fix;
+  FixNoiseModelParameters noise;
+  RangeFixParameters ranges;
+  VelocityNoiseParameters velocity;
+  BiasModeParameters modes;
+  OdometryErrorParameters odometry;
+  double yaw_rate_scale_sigma{0.005};  ///< standard deviation of the odometry's relative yaw-rate error, a constant
+  double fix_scale_lag{15.0};          ///< s apart at which fixes are compared with the odometry between them; 0: never
+  /// m per axis, of the error that fixes share for long (orbits, atmosphere), as far as they declare as much. No filter
+  /// sees it: it is added to the covariance of the estimate
+  double common_error_sigma{0.7};
+
+  template <class V>
+  void visit(V& v) {
+    fix.visit(v);
+    noise.visit(v);
+    ranges.visit(v);
+    velocity.visit(v);
+    modes.visit(v);
+    odometry.visit(v);
+    v("yaw_rate_scale_sigma", yaw_rate_scale_sigma, non_negative());
+    v("fix_scale_lag", fix_scale_lag, non_negative());
+    v("common_error_sigma", common_error_sigma, non_negative());
+  }
+  void check(std::vector<std::string>& faults) const { ranges.check(faults); }
+};
+
+/// Order of the states: pose and odometry errors (kErrorStates), relative error of the yaw rate (1), bias b_x, b_y (m).
+inline constexpr int kMotionStates = kErrorStates + 1;
+inline constexpr int kBiasStates = kMotionStates + 2;
+using BiasEkfState = Eigen::Matrix<double, kBiasStates, 1>;
+using BiasEkfCovariance = Eigen::Matrix<double, kBiasStates, kBiasStates>;
+
+/// The state of the extended Kalman filter that the model is, given the modes of all fixes; the yaw is in [-pi, pi).
+struct BiasGaussian {
+  BiasEkfState mean{BiasEkfState::Zero()};
+  BiasEkfCovariance covariance{BiasEkfCovariance::Zero()};
+
+  Pose2 pose() const { return {mean[0], mean[1], mean[2]}; }
+  bool is_finite() const { return mean.allFinite() && covariance.allFinite(); }
+};
+
+/// The state at a start: no bias, odometry errors about 0.
+BiasGaussian start_gaussian(const PoseEstimate& start, const SwitchingModelParameters& parameters);
+
+/// The difference of two states, the yaw's on the circle.
+BiasEkfState difference(const BiasEkfState& a, const BiasEkfState& b);
+
+/// Mean and covariance of a mixture of `count` >= 1 Gaussians: state_of(i) with weight_of(i), which sum to 1. Yaws are
+/// averaged as differences from the heaviest.
+template <class StateOf, class WeightOf>
+BiasGaussian match_moments(std::size_t count, const StateOf& state_of, const WeightOf& weight_of) {
+  std::size_t heaviest = 0;
+  for (std::size_t i = 1; i < count; ++i) {
+    if (weight_of(i) > weight_of(heaviest)) heaviest = i;
+  }
+  const BiasEkfState centre = state_of(heaviest).mean;
+  BiasEkfState mean = BiasEkfState::Zero();
+  for (std::size_t i = 0; i < count; ++i) mean += weight_of(i) * difference(state_of(i).mean, centre);
+  BiasGaussian whole;
+  for (std::size_t i = 0; i < count; ++i) {
+    if (weight_of(i) <= 0.0) continue;
+    const BiasEkfState spread = difference(state_of(i).mean, centre) - mean;
+    whole.covariance += weight_of(i) * (state_of(i).covariance + spread * spread.transpose());
+  }
+  whole.mean = centre + mean;
+  whole.mean[2] = wrap_angle(whole.mean[2]);
+  return whole;
+}
+
+/// Dead-reckons one step.
+void predict(BiasGaussian& state, const MotionStep& step, const OdometryErrorParameters& parameters);
+
+/// The bias goes on from the last fix, in the lasting mode `from`, to one `elapsed_s` >= 0 later in mode `to`:
+/// predict_bias() within the state.
+void continue_bias(BiasGaussian& state, BiasMode from, BiasMode to, double elapsed_s,
+                   const BiasModeParameters& parameters);
+
+/// What a measurement said.
+struct BiasEkfUpdate {
+  double log_likelihood{-std::numeric_limits<double>::infinity()};
+  double nis{0.0};
+  double white_nis{0.0};  ///< the same without the inflation of correlated fixes
+  double outlier{0.0};    ///< posterior probability that it is one
+};
+
+/// Factors on a fix's covariance.
+struct FixNoise {
+  double scale{1.0};      ///< learnt
+  double inflation{1.0};  ///< of correlated errors
+  bool of_ranges{false};  ///< the covariance is that of the fix's ranges, which use_fix_covariance does not concern
+};
+
+/// Takes a fix of the mode `mode`. Direct reception has the heavy tails of Student's t: a fix that is far off is one of
+/// larger noise. A share of outlier_share of the fixes says nothing: used or not used are matched again.
+BiasEkfUpdate take_fix(BiasGaussian& state, BiasMode mode, const FixMeasurement& fix, const FixNoise& noise,
+                       const SwitchingModelParameters& parameters);
+
+/// Takes a velocity of the receiver, whose noise is Student's t with `noise` for its covariance ((m/s)^2): it corrects
+/// yaw and speed scale. The likelihood is but for a constant.
+BiasEkfUpdate take_velocity(BiasGaussian& state, const VelocityMeasurement& measured, const Eigen::Matrix2d& noise,
+                            double student_dof);
+
+/// What the filters learn of the receiver beside the state, and remember of the time.
+class ReceiverModel {
+ public:
+  /// Requires parameters without faults.
+  explicit ReceiverModel(const SwitchingModelParameters& parameters);
+
+  /// Forgets everything.
+  void reset();
+  void move(const Twist2& twist, double duration_s);
+
+  /// s >= 0 since the last fix; since the start where there was none.
+  double elapsed_s(double time_s) const;
+  /// The fix as far as it is believed: what its ranges say beside the state `before` it (range_fix()) where it has
+  /// them, else with its covariance by FixNoiseModel::believed(). Once a fix, before the others of this class.
+  FixMeasurement believed(const FixMeasurement& fix, const BiasGaussian& before);
+  /// Whether the last fix was what its ranges say.
+  bool of_ranges() const { return of_ranges_; }
+  /// m, of a range in line of sight, as learnt.
+  double range_sigma_m() const;
+  FixNoise fix_noise(double time_s) const {
+    if (of_ranges_) return {1.0, range_noise_.correlation_inflation(time_s), true};
+    return {noise_.scale(), noise_.correlation_inflation(time_s), false};
+  }
+  /// Prior odds of a bias of the fix, against those of the parameters: bias_odds of mode_transition().
+  double bias_odds() const { return of_ranges_ ? parameters_.ranges.range_bias_odds : 1.0; }
+  /// A fix was taken, with a share `exceeding` of its NIS beyond the median.
+  void learn_fix(double time_s, double exceeding);
+  /// Lets the noise model see the fix beside the odometry alone; `before` and `after` it, all modes together.
+  void compare_with_odometry(const FixMeasurement& fix, const BiasGaussian& before, const BiasGaussian& after);
+
+  double velocity_scale() const { return velocity_scale_.value(); }
+  /// A velocity was taken; `before` and `after` it, all modes together.
+  void learn_velocity(double exceeding, const BiasGaussian& before, const BiasGaussian& after);
+
+  /// m^2 per axis, of the error that all fixes share.
+  double common_variance_m2() const { return common_variance_m2_; }
+
+ private:
+  SwitchingModelParameters parameters_;
+  FixNoiseModel noise_;
+  FixNoiseModel range_noise_;
+  FreeSignalLevel free_signals_;
+  bool of_ranges_{false};  ///< the last fix
+  LearntScale velocity_scale_;
+  std::optional<double> last_fix_s_;
+  double moved_s_{0.0};                                   ///< of odometry since the start
+  Eigen::Vector2d corrections_{Eigen::Vector2d::Zero()};  ///< m, what fixes and velocities have moved the position by
+  double common_variance_m2_{0.0};
+};
+
+}  // namespace urban_gnss

@@ -1,0 +1,96 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <deque>
+#include <optional>
+
+#include "urban_gnss_localization/common/parameters.hpp"
+#include "urban_gnss_localization/localizers/switching/learnt_scale.hpp"
+#include "urban_gnss_localization/motion/motion_model.hpp"
+
+namespace urban_gnss {
+
+/// How a receiver's declared covariance is related to the errors of its fixes.
+struct FixNoiseModelParameters {
+  /// 1, by how much a fix changes the logarithm of the factor on the declared covariance; 0: the factor stays 1
+  double fix_scale_rate{0.03};
+  double first_fix_scale{2.0};           ///< factor on the declared covariance before anything is learnt
+  double fix_covariance_weight{0.5};     ///< 0 to 1, how far the declared covariance's ups and downs are believed
+  double fix_scale_limit{15.0};          ///< factor by which declared standard deviations may be wrong, either way
+  double fix_correlation_time{3.0};      ///< s, over which the error of a fix stays the same; 0: independent errors
+  double parked_correlation_time{30.0};  ///< s, the same while the robot stands: reflections change little then (F34)
+
+  template <class V>
+  void visit(V& v) {
+    v("fix_scale_rate", fix_scale_rate, between(0.0, 1.0));
+    v("first_fix_scale", first_fix_scale, positive());
+    v("fix_covariance_weight", fix_covariance_weight, between(0.0, 1.0));
+    v("fix_scale_limit", fix_scale_limit, at_least(1.0));
+    v("fix_correlation_time", fix_correlation_time, non_negative());
+    v("parked_correlation_time", parked_correlation_time, non_negative());
+  }
+  void check(std::vector<std::string>&) const {}
+};
+
+/// A fix beside what was dead-reckoned.
+struct DeadReckonedFix {
+  Eigen::Vector2d misfit;      ///< m, fix minus the dead-reckoned place of the antenna, from any origin
+  Eigen::Matrix2d covariance;  ///< m^2, as declared
+  Eigen::Vector2d place;       ///< m, the dead-reckoned place
+  double walk_m2{0.0};         ///< m^2 per axis, variance of the dead reckoning but for what heading_sigma_rad makes
+  double heading_sigma_rad{0.0};
+  double time_s{0.0};
+};
+
+/// What a fix is worth: the covariance that its receiver declares follows its errors up and down, but is too small
+/// or too large by a factor, which is learnt (LearntScale), and errors are correlated in time.
+///
+/// A receiver that smooths takes a filter along: the innovations stay small, and the factor learnt from them falls
+/// without end. Two fixes that are farther apart than it smooths, and the odometry between them, still tell its errors.
+///
+/// That errors are correlated is markov_inflation().
+class FixNoiseModel {
+ public:
+  /// Requires parameters without faults. `lag_s`: how far apart fixes are compared; 0: they are not.
+  explicit FixNoiseModel(const FixNoiseModelParameters& parameters, double lag_s = 0.0)
+      : parameters_(parameters), lag_s_(lag_s), scale_(fresh_scale()) {}
+
+  /// Forgets everything, the factor too: a filter that starts anew gives the same again.
+  void reset();
+  /// Odometry since the last fix: whether the robot stands.
+  void move(const Twist2& twist, double duration_s);
+
+  double scale() const { return lagged_scale_ ? std::max(scale_.value(), lagged_scale_->value()) : scale_.value(); }
+  /// The next fix declares `declared` (m^2, positive definite): as far as its ups and downs are believed. Its size is
+  /// drawn towards the geometric mean of those declared lately, by the power 1 - fix_covariance_weight, at most by a
+  /// factor of 4.
+  Eigen::Matrix2d believed(const Eigen::Matrix2d& declared);
+  /// Factor on the covariance of a fix at `time_s` by which correlation lowers its worth, at least 1.
+  double correlation_inflation(double time_s) const;
+
+  /// The fix at `time_s` was used, with a share `exceeding` of its NIS beyond the median: LearntScale::learn().
+  void learn(double time_s, double exceeding);
+  /// Compares the fix with that of the lag before: learns a second factor, from differences of which a filter that
+  /// follows its fixes knows nothing. The larger of the two counts.
+  void compare(const DeadReckonedFix& fix);
+
+ private:
+  FixNoiseModelParameters parameters_;
+  double lag_s_;
+  /// Where nothing is learnt, receivers are right.
+  LearntScale fresh_scale() const {
+    return {parameters_.fix_scale_rate, parameters_.fix_scale_limit,
+            parameters_.fix_scale_rate > 0.0 ? parameters_.first_fix_scale : 1.0};
+  }
+
+  std::optional<double> log_mean_variance_;  ///< of what fixes declare, per axis
+  LearntScale scale_;
+  std::optional<LearntScale> lagged_scale_;
+  std::deque<DeadReckonedFix> fixes_;
+  std::optional<double> last_s_;
+  double moved_m_{0.0};
+  double elapsed_s_{0.0};
+};
+
+}  // namespace urban_gnss

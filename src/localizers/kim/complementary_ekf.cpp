@@ -1,0 +1,373 @@
+#include "urban_gnss_localization/localizers/kim/complementary_ekf.hpp"
+
+#include <Eigen/Dense>
+#include <cmath>
+#include <utility>
+
+#include "urban_gnss_localization/gnss/chi_squared.hpp"
+
+namespace urban_gnss {
+namespace {
+
+constexpr int kFixDof = 2;
+/// A robot that moves less than this between two fixes stands.
+constexpr double kParked_mps = 0.02;
+/// A heading with a larger standard deviation than this (rad) is unknown; that of a uniform one is 1.81.
+constexpr double kUnknownHeading_rad = 1.5;
+const Eigen::Matrix2d kBiasObservation = Eigen::Matrix2d::Identity();  // C: the bias adds to the fix
+
+}  // namespace
+
+EnumNames<ComplementaryMode> enum_names(ComplementaryMode) {
+  return {{"standard", ComplementaryMode::kStandard},
+          {"gated", ComplementaryMode::kGated},
+          {"compensated", ComplementaryMode::kCompensated}};
+}
+
+EnumNames<LockoutPolicy> enum_names(LockoutPolicy) {
+  return {{"automatic", LockoutPolicy::kAutomatic}, {"dead_reckoning", LockoutPolicy::kDeadReckoning}};
+}
+
+void ComplementaryEkfParameters::check(std::vector<std::string>& faults) const {
+  detector.check(faults);
+  fix_noise.check(faults);
+  odometry.check(faults);
+}
+
+ComplementaryEkf::ComplementaryEkf(const ComplementaryEkfParameters& parameters)
+    : parameters_(parameters),
+      detector_(parameters.detector),
+      noise_monitor_(parameters.fix_noise),
+      close_threshold_(chi_squared_quantile(parameters.close_probability, kFixDof)),
+      spike_threshold_(2.0 * detector_.threshold()) {  // of two degrees of freedom: the false alarms of false alarms
+  initialize({});
+}
+
+void ComplementaryEkf::initialize(const PoseEstimate& start) {
+  pose_ = start.pose;
+  dead_reckoned_ = start.pose;
+  errors_ = {};
+  filter_.set_state(ErrorState::Zero(), initial_error_covariance(start.covariance, parameters_.odometry));
+  detector_.reset();
+  noise_monitor_.reset();
+  path_.setZero();
+  path_variance_m2_ = 0.0;
+  is_open_ = false;
+  had_fix_ = false;
+  insignificant_ = 0;
+  is_inert_ = false;
+  run_.reset();
+  heading_search_.reset();
+  if (start.covariance(2, 2) > kUnknownHeading_rad * kUnknownHeading_rad)
+    heading_search_.emplace(HeadingInitializerParameters{});
+  moved_since_fix_m_ = 0.0;
+  elapsed_since_fix_s_ = 0.0;
+  last_test_covariance_.setZero();
+  bias_estimates_.clear();
+}
+
+void ComplementaryEkf::move(const Twist2& twist, double duration_s) {
+  DeadReckoningStep step = dead_reckon(pose_, errors_, twist, duration_s, parameters_.odometry);
+  const double distance = std::abs(twist.speed_mps) * duration_s;
+  if (heading_search_) {
+    // Which way it went is unknown: the position stays and becomes uncertain by the distance.
+    step.noise.topLeftCorner<2, 2>().diagonal().array() += distance * (distance + 2.0 * moved_since_fix_m_);
+    step.transition.topRows<2>().rightCols<3>().setZero();
+    step.pose.x = pose_.x;
+    step.pose.y = pose_.y;
+  }
+  moved_since_fix_m_ += distance;
+  elapsed_since_fix_s_ += duration_s;
+  filter_.predict(step.transition * filter_.bias_free_state(), step.transition, step.noise);
+  path_ += step.pose.position() - pose_.position();
+  path_variance_m2_ += 0.5 * step.noise.topLeftCorner<2, 2>().trace();
+  pose_ = step.pose;
+  dead_reckoned_ = urban_gnss::move(dead_reckoned_, twist, duration_s);
+}
+
+void ComplementaryEkf::set_mode(ComplementaryMode mode) {
+  if (mode != ComplementaryMode::kCompensated) close();
+  parameters_.mode = mode;
+}
+
+FixVerdict ComplementaryEkf::correct(const FixMeasurement& fix) {
+  const Eigen::Vector2d predicted = transform_point(pose_, fix.antenna_in_body);
+  const Eigen::Vector2d lever = predicted - pose_.position();
+  noise_monitor_.add(fix.position, fix.covariance, path_ + lever, path_variance_m2_,
+                     std::sqrt(filter_.compensated_covariance().diagonal().segment<2>(2).sum()), fix.time_s);
+
+  Innovation innovation;
+  innovation.value = fix.position - predicted;
+  innovation.observation.setZero();
+  innovation.observation.leftCols<2>().setIdentity();
+  innovation.observation.col(2) << -lever.y(), lever.x();
+  innovation.declared = fix.covariance;
+  innovation.noise = noise_inflation() * fix.covariance;
+  innovation.time_s = fix.time_s;
+
+  if (is_open_) {
+    const double elapsed_s = std::max(0.0, fix.time_s - last_fix_s_);
+    const double share = std::exp(-elapsed_s / parameters_.fix_bias_time);
+    const double grown = parameters_.fix_bias_sigma * parameters_.fix_bias_sigma * (1.0 - share * share);
+    filter_.fade_bias(share);
+    filter_.grow_bias(grown * Eigen::Matrix2d::Identity());
+  }
+  if (run_ && fix.time_s - run_->last_s > parameters_.lockout_gap) run_.reset();
+
+  FixVerdict verdict;
+  if (heading_search_) {
+    verdict.decision = FixDecision::kNotExamined;
+    verdict.reason =
+        search_heading(fix, innovation) ? "heading found from fixes and motion" : "used to find the heading";
+  } else {
+    decide(innovation, verdict);
+  }
+  last_fix_s_ = fix.time_s;
+  had_fix_ = true;
+  moved_since_fix_m_ = 0.0;
+  elapsed_since_fix_s_ = 0.0;
+  publish(fix, predicted, verdict);
+  return verdict;
+}
+
+bool ComplementaryEkf::is_adaptive() const {
+  return parameters_.adapt_every_mode || parameters_.mode == ComplementaryMode::kCompensated;
+}
+
+double ComplementaryEkf::noise_inflation() const {
+  if (!is_adaptive()) return 1.0;
+  const double inflation = noise_monitor_.inflation();
+  const bool is_parked = elapsed_since_fix_s_ > 0.0 && moved_since_fix_m_ < kParked_mps * elapsed_since_fix_s_;
+  if (!is_parked) return inflation;
+  // The mean of errors of correlation time tau over a time T has the variance 2 tau / T of one of them.
+  return std::max(inflation, 2.0 * parameters_.parked_correlation_time / elapsed_since_fix_s_);
+}
+
+bool ComplementaryEkf::search_heading(const FixMeasurement& fix, const Innovation& innovation) {
+  const Pose2 antenna{fix.antenna_in_body.x(), fix.antenna_in_body.y(), 0.0};
+  heading_search_->add(compose(dead_reckoned_, antenna), {from_seconds(fix.time_s), fix.position, fix.covariance});
+  std::optional<PoseEstimate> found = heading_search_->estimate();
+  if (!found) {
+    Innovation position_only = innovation;
+    position_only.observation.col(2).setZero();
+    apply(position_only);
+    return false;
+  }
+  // The fixes that it was found from share an error that their scatter does not show.
+  found->covariance.topLeftCorner<2, 2>() += fix.covariance;
+  found->pose = compose(found->pose, inverse(antenna));
+  initialize(*found);
+  return true;
+}
+
+void ComplementaryEkf::decide(const Innovation& innovation, FixVerdict& verdict) {
+  const Eigen::Matrix2d covariance = prediction_covariance(innovation) + innovation.declared;
+  last_test_covariance_ = covariance;
+  verdict.nis_dof = kFixDof;
+  verdict.nis_threshold = detector_.threshold();
+  verdict.decision = FixDecision::kAccepted;
+  if (is_open_) {
+    decide_open(innovation, verdict);
+    return;
+  }
+  const BiasDetection detection = detector_.test(innovation.value, covariance);
+  verdict.nis = detection.nis;
+  is_inert_ = detection.is_inert;
+  const bool is_biased = is_adaptive() ? detection.is_biased() : detection.is_jump;
+  if (parameters_.mode == ComplementaryMode::kStandard || !is_biased) {
+    run_.reset();
+    apply(innovation);
+    if (is_inert_) verdict.reason = "gate inert: the fixes scatter far less than their covariance says";
+    return;
+  }
+  if (detection.is_ramp) verdict.reason = "the fixes drift away from the odometry";
+  if (parameters_.mode == ComplementaryMode::kGated) {
+    reject(innovation, verdict);
+  } else {
+    open_or_reject(innovation, verdict);
+  }
+}
+
+void ComplementaryEkf::open_or_reject(const Innovation& innovation, FixVerdict& verdict) {
+  const Eigen::Matrix2d m0 = parameters_.fix_bias_sigma * parameters_.fix_bias_sigma * Eigen::Matrix2d::Identity();
+  const Eigen::Matrix2d covariance = prediction_covariance(innovation) + innovation.declared + m0;
+  if (normalised_innovation_squared(innovation.value, covariance) > detector_.threshold()) {
+    verdict.reason = "farther away than a bias explains";
+    reject(innovation, verdict);
+    return;
+  }
+  filter_.open_bias(m0);
+  if (!is_open_) opened_s_ = innovation.time_s;
+  is_open_ = true;
+  is_confirmed_ = false;
+  opening_nis_ = normalised_innovation_squared(innovation.value, covariance - m0);
+  insignificant_ = 0;
+  doubt(innovation);
+  apply(innovation);
+  verdict.decision = FixDecision::kBiasCompensated;
+}
+
+void ComplementaryEkf::decide_open(const Innovation& innovation, FixVerdict& verdict) {
+  const Eigen::Vector2d compensated = innovation.value - filter_.bias();
+  verdict.nis = normalised_innovation_squared(
+      compensated, filter_.innovation_covariance(innovation.observation, kBiasObservation, innovation.declared));
+  const double direct =
+      normalised_innovation_squared(innovation.value, prediction_covariance(innovation) + innovation.declared);
+  if (!is_confirmed_ && is_false_alarm(innovation, direct, verdict)) return;
+  if (verdict.nis <= detector_.threshold()) {
+    is_confirmed_ = true;
+    doubt(innovation);
+    apply(innovation);
+    verdict.decision = FixDecision::kBiasCompensated;
+    close_if_insignificant(innovation, verdict);
+    return;
+  }
+  // The bias has jumped: away, or to another.
+  if (direct <= detector_.threshold()) {
+    close();
+    verdict.nis = direct;
+    verdict.reason = "the bias has ended";
+    apply(innovation);
+    return;
+  }
+  open_or_reject(innovation, verdict);
+}
+
+bool ComplementaryEkf::is_false_alarm(const Innovation& innovation, double direct_nis, FixVerdict& verdict) {
+  const Eigen::Matrix2d without = prediction_covariance(innovation) + innovation.declared;
+  const Eigen::Matrix2d with =
+      filter_.innovation_covariance(innovation.observation, kBiasObservation, innovation.declared);
+  // Likelihood of the fix without a bias against that with the bias that the last fix showed.
+  const bool speaks_for_none = direct_nis <= detector_.threshold() && direct_nis + std::log(without.determinant()) <
+                                                                          verdict.nis + std::log(with.determinant());
+  if (!speaks_for_none) return false;
+  Innovation unbiased = innovation;
+  if (opening_nis_ <= spike_threshold_) {
+    filter_.discard_bias();  // the fix that raised the alarm counts after all
+    unbiased.value -= innovation.observation * filter_.bias_free_state();
+    feed_back();
+    verdict.reason = "the bias was a false alarm";
+  } else {
+    verdict.reason = "the bias was a spike";
+  }
+  close();
+  verdict.nis = direct_nis;
+  apply(unbiased);
+  return true;
+}
+
+void ComplementaryEkf::close_if_insignificant(const Innovation& innovation, FixVerdict& verdict) {
+  insignificant_ = bias_statistic() <= close_threshold_ ? insignificant_ + 1 : 0;
+  if (insignificant_ >= parameters_.close_count) {
+    close();
+    verdict.reason = "the bias has become insignificant";
+  } else if (parameters_.lockout_policy == LockoutPolicy::kAutomatic &&
+             innovation.time_s - opened_s_ > parameters_.bias_open_timeout) {
+    Innovation next = innovation;
+    next.value = filter_.bias();
+    restart_position(next);
+    verdict.reason = "position started anew on the fixes: the bias was significant for too long";
+  }
+}
+
+void ComplementaryEkf::reject(const Innovation& innovation, FixVerdict& verdict) {
+  doubt(innovation);
+  verdict.decision = FixDecision::kRejectedGate;
+  if (verdict.reason.empty()) verdict.reason = "innovation above its gate";
+  if (parameters_.lockout_policy == LockoutPolicy::kAutomatic &&
+      innovation.time_s - run_->since_s >= parameters_.lockout_timeout) {
+    restart_position(innovation);
+    verdict.decision = FixDecision::kInflated;
+    verdict.reason = "position started anew on the fixes after nothing but rejections";
+  }
+}
+
+void ComplementaryEkf::restart_position(const Innovation& innovation) {
+  close();
+  ErrorCovariance covariance = filter_.compensated_covariance();
+  // As uncertain as the fix shows it to be wrong; heading and odometry errors are kept (F8).
+  covariance.topLeftCorner<2, 2>() += innovation.value * innovation.value.transpose();
+  filter_.set_state(ErrorState::Zero(), covariance);
+  apply(innovation);
+  run_.reset();
+  detector_.reset();
+}
+
+void ComplementaryEkf::close() {
+  filter_.close_bias();
+  is_open_ = false;
+  insignificant_ = 0;
+  run_.reset();
+  detector_.reset();
+}
+
+void ComplementaryEkf::apply(const Innovation& innovation) {
+  filter_.correct(innovation.value - innovation.observation * filter_.bias_free_state(), innovation.observation,
+                  kBiasObservation, innovation.noise);
+  feed_back();
+}
+
+void ComplementaryEkf::feed_back() {
+  const ErrorState error = filter_.compensated_state();
+  pose_ = {pose_.x + error(0), pose_.y + error(1), wrap_angle(pose_.yaw + error(2))};
+  errors_.speed_scale += error(3);
+  errors_.yaw_rate_bias_radps += error(4);
+  filter_.shift_origin(error);
+}
+
+Eigen::Matrix2d ComplementaryEkf::prediction_covariance(const Innovation& innovation) const {
+  if (run_ && run_->is_frozen) return run_->covariance;
+  return innovation.observation * filter_.compensated_covariance() * innovation.observation.transpose();
+}
+
+void ComplementaryEkf::doubt(const Innovation& innovation) {
+  if (!run_) run_ = Run{innovation.time_s, innovation.time_s, Eigen::Matrix2d::Zero(), false};
+  if (!run_->is_frozen && innovation.time_s - run_->since_s >= parameters_.detection_horizon) {
+    run_->covariance = prediction_covariance(innovation);
+    run_->is_frozen = true;
+  }
+  run_->last_s = innovation.time_s;
+}
+
+double ComplementaryEkf::bias_statistic() const {
+  return is_open_ ? normalised_innovation_squared(filter_.bias(), filter_.bias_covariance()) : 0.0;
+}
+
+double ComplementaryEkf::smallest_detectable_jump_m() const {
+  if (!had_fix_) return 0.0;
+  return urban_gnss::smallest_detectable_jump(last_test_covariance_, parameters_.detector.gate_probability);
+}
+
+PoseEstimate ComplementaryEkf::estimate() const {
+  return {pose_, filter_.compensated_covariance().topLeftCorner<3, 3>()};
+}
+
+LocalizerHealth ComplementaryEkf::health() const {
+  LocalizerHealth health;
+  health.heading_sigma_rad = std::sqrt(filter_.compensated_covariance()(2, 2));
+  health.bias_radius_m = bias().norm();
+  health.is_gate_inert = is_inert_;
+  return health;
+}
+
+void ComplementaryEkf::publish(const FixMeasurement& fix, const Eigen::Vector2d& predicted, const FixVerdict& verdict) {
+  constexpr std::size_t kMostKept = 1000;  // where nobody takes them
+  BiasEstimate estimate;
+  estimate.stamp = fix.stamp;
+  estimate.bias = filter_.bias();
+  estimate.covariance = filter_.bias_covariance();
+  estimate.radius_m = estimate.bias.norm();
+  estimate.shadow_statistic = bias_statistic();
+  estimate.shadow_threshold = close_threshold_;
+  estimate.in_shadow = estimate.shadow_statistic > close_threshold_;
+  estimate.fix_position = fix.position;
+  estimate.predicted_antenna_position = predicted;
+  estimate.verdict = verdict;
+  estimate.verdict.stamp = fix.stamp;
+  if (bias_estimates_.size() >= kMostKept) bias_estimates_.erase(bias_estimates_.begin());
+  bias_estimates_.push_back(std::move(estimate));
+}
+
+std::vector<BiasEstimate> ComplementaryEkf::take_bias_estimates() { return std::exchange(bias_estimates_, {}); }
+
+}  // namespace urban_gnss

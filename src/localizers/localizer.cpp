@@ -1,0 +1,24 @@
+#include "urban_gnss_localization/localizers/localizer.hpp"
+
+#include <cmath>
+
+#include "urban_gnss_localization/localizers/maier/unscented.hpp"
+
+namespace urban_gnss {
+
+bool is_usable(const FixMeasurement& fix) {
+  return fix.position.allFinite() && fix.antenna_in_body.allFinite() && std::isfinite(fix.time_s) &&
+         is_positive_definite<2>(fix.covariance);
+}
+
+bool is_usable(const VelocityMeasurement& velocity) {
+  return velocity.velocity.allFinite() && velocity.antenna_velocity_in_body.allFinite() &&
+         is_positive_definite<2>(velocity.covariance);
+}
+
+bool is_usable(const Twist2& twist, double duration_s) {
+  return std::isfinite(twist.speed_mps) && std::isfinite(twist.yaw_rate_radps) && std::isfinite(duration_s) &&
+         duration_s > 0.0;
+}
+
+}  // namespace urban_gnss

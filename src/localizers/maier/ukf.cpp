@@ -1,0 +1,221 @@
+#include "urban_gnss_localization/localizers/maier/ukf.hpp"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include "urban_gnss_localization/motion/dead_reckoning.hpp"
+#include "urban_gnss_localization/gnss/chi_squared.hpp"
+#include "urban_gnss_localization/gnss/correlated_errors.hpp"
+
+namespace urban_gnss {
+namespace {
+
+constexpr int kFixDof = 2;
+constexpr int kNoise = 3;  ///< speed, second input, yaw rate: MotionNoise
+constexpr int kAugmented = Ukf::kDimension + kNoise;
+constexpr int kYaw = 2;
+
+constexpr double kUnknownYawVariance = kPi * kPi / 3.0;
+
+/// g of eq. (1): the pose after one step of odometry, freed of the errors that the state holds.
+Pose2 moved(const Ukf::State& state, const MotionStep& step, const MotionNoise& noise) {
+  return move_noisily({state[0], state[1], state[kYaw]}, step, noise, {state[3], state[4]});
+}
+
+void limit_yaw_variance(Ukf::Covariance& covariance) {
+  const double variance = covariance(kYaw, kYaw);
+  if (variance <= kUnknownYawVariance) return;
+  const double factor = std::sqrt(kUnknownYawVariance / variance);
+  covariance.row(kYaw) *= factor;
+  covariance.col(kYaw) *= factor;
+}
+
+}  // namespace
+
+EnumNames<OutlierPolicy> enum_names(OutlierPolicy) {
+  return {{"student_t", OutlierPolicy::kStudentT}, {"gate", OutlierPolicy::kGate}, {"none", OutlierPolicy::kNone}};
+}
+
+Ukf::Ukf(const UkfParameters& parameters, const MotionParameters& motion)
+    : parameters_(parameters),
+      motion_(motion),
+      motion_weights_(
+          UnscentedWeights::of(kAugmented, parameters.ukf_alpha, parameters.ukf_beta, parameters.ukf_kappa)),
+      fix_weights_(UnscentedWeights::of(kDimension, parameters.ukf_alpha, parameters.ukf_beta, parameters.ukf_kappa)),
+      nis_threshold_(parameters.gate_probability < 1.0 ? chi_squared_quantile(parameters.gate_probability, kFixDof)
+                                                       : std::numeric_limits<double>::infinity()) {
+  initialize({});
+}
+
+void Ukf::initialize(const PoseEstimate& start) {
+  if (!is_finite(start.pose)) throw std::invalid_argument("ukf: the pose to start from is not finite");
+  if (!start.covariance.allFinite()) throw std::invalid_argument("ukf: the covariance to start from is not finite");
+  const Covariance covariance = initial_error_covariance(start.covariance, parameters_.odometry);
+  state_ << start.pose.x, start.pose.y, wrap_angle(start.pose.yaw), 0.0, 0.0;
+  covariance_ = is_positive_definite(covariance) ? covariance : nearest_positive_definite(covariance);
+  limit_yaw_variance(covariance_);
+  last_used_s_.reset();
+  rejected_since_s_.reset();
+}
+
+void Ukf::move(const Twist2& twist, double duration_s) {
+  if (!is_usable(twist, duration_s)) return;
+  if (is_parked(twist)) {
+    Covariance covariance = covariance_;
+    const double walk = parameters_.odometry.parked_walk;
+    covariance.diagonal().head<2>().array() += walk * walk * duration_s;
+    accept(state_, covariance);
+    return;
+  }
+  const MotionStep step = make_motion_step(twist, duration_s, motion_, parameters_.odometry);
+  const Pose2 centre = moved(state_, step, {});
+  const double centre_turn = angle_difference(centre.yaw, state_[kYaw]);
+  const Covariance root = motion_weights_.spread * cholesky_root(covariance_);
+
+  // Differences of the moved points from the moved centre.
+  Eigen::Matrix<double, kDimension, 2 * kAugmented> differences;
+  for (int i = 0; i < 2 * kAugmented; ++i) {
+    const int axis = i / 2;
+    const double sign = i % 2 == 0 ? 1.0 : -1.0;
+    State offset = State::Zero();
+    MotionNoise noise;
+    if (axis < kDimension) {
+      offset = sign * root.col(axis);
+    } else {
+      const double draw = sign * motion_weights_.spread;
+      (axis == kDimension ? noise.speed : axis == kDimension + 1 ? noise.input : noise.yaw_rate) = draw;
+    }
+    const State point = state_ + offset;
+    const Pose2 pose = moved(point, step, noise);
+    const double turn = angle_difference(pose.yaw, point[kYaw]);
+    differences.col(i) << pose.x - centre.x, pose.y - centre.y, offset[kYaw] + angle_difference(turn, centre_turn),
+        offset[3], offset[4];
+  }
+  const State mean = motion_weights_.other * differences.rowwise().sum();
+  const auto centred = differences.colwise() - mean;
+  Covariance covariance = motion_weights_.other * centred * centred.transpose() +
+                          motion_weights_.centre_covariance * mean * mean.transpose();
+  const double scale_walk = parameters_.odometry.speed_scale_walk;
+  const double bias_walk = parameters_.odometry.yaw_rate_bias_walk;
+  const double position_walk = parameters_.odometry.position_walk;
+  const double heading_walk = parameters_.odometry.heading_walk;
+  covariance.diagonal().head<2>().array() += position_walk * position_walk * duration_s;
+  covariance(kYaw, kYaw) += heading_walk * heading_walk * duration_s;
+  covariance(3, 3) += scale_walk * scale_walk * duration_s;
+  covariance(4, 4) += bias_walk * bias_walk * duration_s;
+
+  State state = state_;
+  state.head<3>() << centre.x, centre.y, centre.yaw;
+  accept(state + mean, covariance);
+}
+
+bool Ukf::accept(State state, Covariance covariance) {
+  if (!state.allFinite() || !covariance.allFinite()) return false;
+  state[kYaw] = wrap_angle(state[kYaw]);
+  covariance = 0.5 * (covariance + covariance.transpose().eval());
+  limit_yaw_variance(covariance);
+  if (!is_positive_definite(covariance)) covariance = nearest_positive_definite(covariance);
+  if (!is_positive_definite(covariance)) return false;
+  state_ = state;
+  covariance_ = covariance;
+  return true;
+}
+
+Ukf::Prediction Ukf::predict(const Eigen::Vector2d& antenna_in_body) const {
+  const Eigen::Vector2d centre = transform_point(pose(), antenna_in_body);
+  const Covariance root = fix_weights_.spread * cholesky_root(covariance_);
+  Eigen::Matrix<double, 2, 2 * kDimension> differences;
+  Eigen::Matrix<double, kDimension, 2 * kDimension> offsets;
+  for (int i = 0; i < 2 * kDimension; ++i) {
+    offsets.col(i) = (i % 2 == 0 ? 1.0 : -1.0) * root.col(i / 2);
+    const State point = state_ + offsets.col(i);
+    differences.col(i) = transform_point({point[0], point[1], point[kYaw]}, antenna_in_body) - centre;
+  }
+  const Eigen::Vector2d mean = fix_weights_.other * differences.rowwise().sum();
+  const auto centred = differences.colwise() - mean;
+  Prediction prediction;
+  prediction.position = centre + mean;
+  prediction.covariance =
+      fix_weights_.other * centred * centred.transpose() + fix_weights_.centre_covariance * mean * mean.transpose();
+  prediction.with_state = fix_weights_.other * offsets * centred.transpose();
+  return prediction;
+}
+
+FixVerdict Ukf::correct(const FixMeasurement& fix) {
+  FixVerdict verdict;
+  if (!is_usable(fix)) {
+    verdict.decision = FixDecision::kRejectedNonFinite;
+    verdict.reason = "position, time or covariance cannot be used";
+    return verdict;
+  }
+  Prediction prediction = predict(fix.antenna_in_body);
+  const Eigen::Vector2d innovation = fix.position - prediction.position;
+  verdict.nis = innovation.dot((prediction.covariance + fix.covariance).ldlt().solve(innovation));
+  verdict.nis_dof = kFixDof;
+  verdict.nis_threshold = nis_threshold_;
+  verdict.decision = FixDecision::kAccepted;
+  if (is_settled_by_gate(fix, innovation, verdict)) return verdict;
+
+  double weight = 1.0;
+  if (parameters_.outliers == OutlierPolicy::kStudentT) {
+    weight = std::min(1.0, (parameters_.student_dof + kFixDof) / (parameters_.student_dof + verdict.nis));
+    if (verdict.nis > nis_threshold_) {
+      verdict.decision = FixDecision::kInflated;
+      verdict.reason = "outlier, weight " + std::to_string(weight);
+    }
+  }
+  const Eigen::Matrix2d noise = correlation_inflation(fix.time_s) / weight * fix.covariance;
+  const Eigen::Matrix2d innovation_covariance = prediction.covariance + noise;
+  const Eigen::Matrix<double, kDimension, 2> gain =
+      innovation_covariance.ldlt().solve(prediction.with_state.transpose()).transpose();
+  if (!accept(state_ + gain * innovation, covariance_ - gain * innovation_covariance * gain.transpose())) {
+    verdict.decision = FixDecision::kRejectedDegenerate;
+    verdict.reason = "the update is not finite";
+    return verdict;
+  }
+  last_used_s_ = fix.time_s;
+  return verdict;
+}
+
+double Ukf::correlation_inflation(double time_s) const {
+  return last_used_s_ ? markov_inflation(time_s - *last_used_s_, parameters_.fix_correlation_time) : 1.0;
+}
+
+bool Ukf::is_settled_by_gate(const FixMeasurement& fix, const Eigen::Vector2d& innovation, FixVerdict& verdict) {
+  if (parameters_.outliers != OutlierPolicy::kGate || verdict.nis <= nis_threshold_) {
+    rejected_since_s_.reset();
+    return false;
+  }
+  if (!rejected_since_s_) rejected_since_s_ = fix.time_s;
+  if (fix.time_s - *rejected_since_s_ < parameters_.gate_timeout) {
+    verdict.decision = FixDecision::kRejectedGate;
+    return true;
+  }
+  // Locked out for so long: the estimate is wrong, not the fixes. All but the position is kept.
+  State state = state_;
+  state.head<2>() += innovation;
+  Covariance covariance = covariance_;
+  covariance.topRows<2>().setZero();
+  covariance.leftCols<2>().setZero();
+  covariance.topLeftCorner<2, 2>() = fix.covariance;
+  if (!accept(state, covariance)) {
+    verdict.decision = FixDecision::kRejectedDegenerate;
+    return true;
+  }
+  rejected_since_s_.reset();
+  last_used_s_ = fix.time_s;
+  verdict.reason = "restarted on the fix after " + std::to_string(parameters_.gate_timeout) + " s of rejections";
+  return true;
+}
+
+LocalizerHealth Ukf::health() const {
+  LocalizerHealth health;
+  health.heading_sigma_rad = std::sqrt(covariance_(kYaw, kYaw));
+  health.position_spread_m = std::sqrt(covariance_.topLeftCorner<2, 2>().trace());
+  return health;
+}
+
+}  // namespace urban_gnss

@@ -1,0 +1,82 @@
+#include "urban_gnss_localization/localizers/switching/fix_noise_model.hpp"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+
+#include "urban_gnss_localization/gnss/correlated_errors.hpp"
+
+namespace urban_gnss {
+namespace {
+
+/// Slower than this on average since the last fix, the robot stands.
+constexpr double kParked_mps = 0.05;
+/// Weight of a fix in the mean of what fixes declare.
+constexpr double kMeanRate = 0.03;
+/// ln of the most by which a declared variance is changed: one that says "worth nothing" is still worth next to
+/// nothing.
+const double kMostTempered = std::log(4.0);
+
+/// ln of the geometric mean of the variances along the ellipse's axes.
+double log_variance(const Eigen::Matrix2d& covariance) { return 0.5 * std::log(covariance.determinant()); }
+
+}  // namespace
+
+void FixNoiseModel::reset() {
+  scale_ = fresh_scale();
+  log_mean_variance_.reset();
+  lagged_scale_.reset();
+  fixes_.clear();
+  last_s_.reset();
+  moved_m_ = 0.0;
+  elapsed_s_ = 0.0;
+}
+
+void FixNoiseModel::move(const Twist2& twist, double duration_s) {
+  moved_m_ += std::abs(twist.speed_mps) * duration_s;
+  elapsed_s_ += duration_s;
+}
+
+Eigen::Matrix2d FixNoiseModel::believed(const Eigen::Matrix2d& declared) {
+  const double now = log_variance(declared);
+  if (!log_mean_variance_) log_mean_variance_ = now;
+  *log_mean_variance_ += kMeanRate * (now - *log_mean_variance_);
+  const double tempered = (1.0 - parameters_.fix_covariance_weight) * (now - *log_mean_variance_);
+  return std::exp(-std::clamp(tempered, -kMostTempered, kMostTempered)) * declared;
+}
+
+double FixNoiseModel::correlation_inflation(double time_s) const {
+  const bool is_parked = elapsed_s_ > 0.0 && moved_m_ < kParked_mps * elapsed_s_;
+  const double correlation_s = is_parked ? parameters_.parked_correlation_time : parameters_.fix_correlation_time;
+  return last_s_ ? markov_inflation(time_s - *last_s_, correlation_s) : 1.0;
+}
+
+void FixNoiseModel::learn(double time_s, double exceeding) {
+  scale_.learn(exceeding);
+  last_s_ = time_s;
+  moved_m_ = 0.0;
+  elapsed_s_ = 0.0;
+}
+
+void FixNoiseModel::compare(const DeadReckonedFix& fix) {
+  if (lag_s_ <= 0.0) return;
+  while (fixes_.size() > 1 && fix.time_s - fixes_[1].time_s >= lag_s_) fixes_.pop_front();
+  if (!fixes_.empty()) {
+    const DeadReckonedFix& before = fixes_.front();
+    const double apart = fix.time_s - before.time_s;
+    if (apart >= lag_s_ && apart < 2.0 * lag_s_) {
+      if (!lagged_scale_) lagged_scale_ = scale_;
+      const double turned =
+          (fix.place - before.place).norm() * std::max(fix.heading_sigma_rad, before.heading_sigma_rad);
+      const Eigen::Matrix2d covariance =
+          lagged_scale_->value() * (fix.covariance + before.covariance) +
+          (std::max(fix.walk_m2 - before.walk_m2, 0.0) + turned * turned) * Eigen::Matrix2d::Identity();
+      const Eigen::Vector2d difference = fix.misfit - before.misfit;
+      const double nis = difference.dot(covariance.inverse() * difference);
+      lagged_scale_->learn(nis > LearntScale::kMedianNis ? 1.0 : 0.0);
+    }
+  }
+  fixes_.push_back(fix);
+}
+
+}  // namespace urban_gnss

@@ -1,0 +1,169 @@
+#include "urban_gnss_localization/localizers/switching/imm_ekf.hpp"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "urban_gnss_localization/gnss/chi_squared.hpp"
+
+namespace urban_gnss {
+namespace {
+
+constexpr int kFixDof = 2;
+constexpr int kYaw = 2;
+/// Of direct reception's normalised innovation, for the verdict alone.
+constexpr double kReportedQuantile = 0.99;
+constexpr BiasMode kModes[kContinuations] = {BiasMode::kDirect, BiasMode::kSlow, BiasMode::kFast, BiasMode::kJump};
+
+using Gaussian = ImmEkf::Gaussian;
+
+template <std::size_t N>
+Gaussian mixture_of(const std::array<Gaussian, N>& parts, const std::array<double, N>& weights) {
+  return match_moments(
+      N, [&](std::size_t i) -> const Gaussian& { return parts[i]; }, [&](std::size_t i) { return weights[i]; });
+}
+
+}  // namespace
+
+ImmEkf::ImmEkf(const ImmEkfParameters& parameters, const MotionParameters& motion)
+    : parameters_(parameters),
+      motion_(motion),
+      nis_threshold_(chi_squared_quantile(kReportedQuantile, kFixDof)),
+      receiver_(parameters) {
+  initialize({});
+}
+
+void ImmEkf::initialize(const PoseEstimate& start) {
+  if (!is_finite(start.pose)) throw std::invalid_argument("imm_ekf: the pose to start from is not finite");
+  if (!start.covariance.allFinite()) throw std::invalid_argument("imm_ekf: the covariance to start from is not finite");
+  filters_.fill(start_gaussian(start, parameters_));
+  probability_ << 1.0, 0.0, 0.0;
+  receiver_.reset();
+}
+
+void ImmEkf::move(const Twist2& twist, double duration_s) {
+  if (!is_usable(twist, duration_s)) return;
+  receiver_.move(twist, duration_s);
+  const MotionStep step = make_motion_step(twist, duration_s, motion_, parameters_.odometry);
+  for (Gaussian& filter : filters_) predict(filter, step, parameters_.odometry);
+}
+
+Gaussian ImmEkf::mixed_into(BiasMode to, const ModeTransition& transition, double elapsed_s) const {
+  std::array<Gaussian, kLastingModes> parts = filters_;
+  std::array<double, kLastingModes> weights{};
+  double sum = 0.0;
+  for (std::size_t i = 0; i < kLastingModes; ++i) {
+    weights[i] = probability_[static_cast<int>(i)] * transition(static_cast<int>(i), static_cast<int>(index_of(to)));
+    sum += weights[i];
+    continue_bias(parts[i], kModes[i], to, elapsed_s, parameters_.modes);
+  }
+  if (!(sum > 0.0)) return parts[0];
+  for (double& weight : weights) weight /= sum;
+  return mixture_of(parts, weights);
+}
+
+FixVerdict ImmEkf::correct(const FixMeasurement& declared) {
+  FixVerdict verdict;
+  if (!is_usable(declared)) {
+    verdict.decision = FixDecision::kRejectedNonFinite;
+    verdict.reason = "position, time or covariance cannot be used";
+    return verdict;
+  }
+  const Gaussian before = mixture();
+  const FixMeasurement fix = receiver_.believed(declared, before);
+  verdict.of_ranges = receiver_.of_ranges();
+  const double elapsed_s = receiver_.elapsed_s(fix.time_s);
+  const FixNoise noise = receiver_.fix_noise(fix.time_s);
+  const ModeTransition transition = mode_transition(elapsed_s, parameters_.modes, receiver_.bias_odds());
+  const Eigen::Vector4d prior = transition.transpose() * probability_;
+  std::array<Gaussian, kContinuations> next;
+  std::array<BiasEkfUpdate, kContinuations> updates;
+  std::array<double, kContinuations> posterior{};
+  double largest = -std::numeric_limits<double>::infinity();
+  bool is_finite = true;
+  for (std::size_t j = 0; j < kContinuations; ++j) {
+    next[j] = mixed_into(kModes[j], transition, elapsed_s);
+    updates[j] = take_fix(next[j], kModes[j], fix, noise, parameters_);
+    is_finite = is_finite && next[j].is_finite();
+    posterior[j] = std::log(prior[static_cast<int>(j)]) + updates[j].log_likelihood;
+    largest = std::max(largest, posterior[j]);
+  }
+  verdict.nis = updates[index_of(BiasMode::kDirect)].nis;
+  verdict.nis_dof = kFixDof;
+  verdict.nis_threshold = nis_threshold_;
+  if (!is_finite || !std::isfinite(largest)) {
+    verdict.decision = FixDecision::kRejectedDegenerate;
+    verdict.reason = "the update is not finite";
+    return verdict;
+  }
+  double sum = 0.0;
+  for (double& p : posterior) sum += p = std::exp(p - largest);
+  double any_outlier = 0.0;
+  double exceeding = 0.0;
+  for (std::size_t j = 0; j < kContinuations; ++j) {
+    any_outlier += (posterior[j] /= sum) * updates[j].outlier;
+    if (updates[j].white_nis > LearntScale::kMedianNis) exceeding += posterior[j];
+  }
+  receiver_.learn_fix(fix.time_s, exceeding);
+
+  constexpr std::size_t kSlow = index_of(BiasMode::kSlow);
+  constexpr std::size_t kJump = index_of(BiasMode::kJump);
+  const double slow = posterior[kSlow] + posterior[kJump];
+  filters_[index_of(BiasMode::kDirect)] = next[index_of(BiasMode::kDirect)];
+  filters_[index_of(BiasMode::kFast)] = next[index_of(BiasMode::kFast)];
+  if (slow > 0.0) {
+    filters_[kSlow] = mixture_of<2>({next[kSlow], next[kJump]}, {posterior[kSlow] / slow, posterior[kJump] / slow});
+  }
+  probability_ << posterior[index_of(BiasMode::kDirect)], slow, posterior[index_of(BiasMode::kFast)];
+  receiver_.compare_with_odometry(fix, before, mixture());
+
+  verdict.decision = probability_[0] >= 0.5 ? FixDecision::kAccepted : FixDecision::kBiasCompensated;
+  if (any_outlier > 0.5) {
+    verdict.decision = FixDecision::kInflated;
+    verdict.reason = "outlier, probability " + std::to_string(any_outlier);
+  }
+  return verdict;
+}
+
+void ImmEkf::correct_velocity(const VelocityMeasurement& measured) {
+  if (!is_usable(measured)) return;
+  const Eigen::Matrix2d noise = receiver_.velocity_scale() * measured.covariance;
+  std::array<Gaussian, kLastingModes> next = filters_;
+  ModeProbabilities log_weight;
+  double exceeding = 0.0;
+  for (std::size_t i = 0; i < kLastingModes; ++i) {
+    const BiasEkfUpdate update = take_velocity(next[i], measured, noise, parameters_.velocity.velocity_dof);
+    log_weight[static_cast<int>(i)] = update.log_likelihood;
+    if (update.nis > LearntScale::kMedianNis) exceeding += probability_[static_cast<int>(i)];
+    if (!next[i].is_finite()) return;
+  }
+  const Gaussian before = mixture();
+  filters_ = next;
+  probability_ = probability_.cwiseProduct((log_weight.array() - log_weight.maxCoeff()).exp().matrix());
+  probability_ /= probability_.sum();
+  receiver_.learn_velocity(exceeding, before, mixture());
+}
+
+Gaussian ImmEkf::mixture() const {
+  return mixture_of<kLastingModes>(filters_, {probability_[0], probability_[1], probability_[2]});
+}
+
+Pose2 ImmEkf::pose() const { return mixture().pose(); }
+
+PoseEstimate ImmEkf::estimate() const {
+  const Gaussian all = mixture();
+  PoseEstimate estimate{all.pose(), all.covariance.topLeftCorner<3, 3>()};
+  estimate.covariance.diagonal().head<2>().array() += receiver_.common_variance_m2();
+  return estimate;
+}
+
+LocalizerHealth ImmEkf::health() const {
+  const Gaussian all = mixture();
+  LocalizerHealth health;
+  health.heading_sigma_rad = std::sqrt(all.covariance(kYaw, kYaw));
+  health.position_spread_m = std::sqrt(all.covariance.topLeftCorner<2, 2>().trace());
+  return health;
+}
+
+}  // namespace urban_gnss

@@ -1,0 +1,115 @@
+#include "urban_gnss_localization/motion/dead_reckoning.hpp"
+
+#include <cmath>
+
+namespace urban_gnss {
+namespace {
+
+double square(double value) { return value * value; }
+
+/// Moves at the corrected twist and fills pose and transition; returns how a distance (m) and a turn (rad) show in the
+/// pose, as columns.
+Eigen::Matrix<double, 3, 2> linearise(const Pose2& pose, const OdometryErrors& errors, const Twist2& measured,
+                                      double duration_s, DeadReckoningStep& step) {
+  const Twist2 twist = corrected(measured, errors);
+  step.pose = move(pose, twist, duration_s);
+  const double dx = step.pose.x - pose.x;
+  const double dy = step.pose.y - pose.y;
+  step.transition.setIdentity();
+  step.transition(0, 2) = -dy;
+  step.transition(1, 2) = dx;
+  // Of a distance, along the chord; of a turn, half of it shows in the chord's direction.
+  const double chord_yaw = pose.yaw + 0.5 * twist.yaw_rate_radps * duration_s;
+  Eigen::Matrix<double, 3, 2> k;
+  k << std::cos(chord_yaw), -0.5 * dy, std::sin(chord_yaw), 0.5 * dx, 0.0, 1.0;
+  step.transition.block<3, 1>(0, 3) = k.col(0) * measured.speed_mps * duration_s;
+  step.transition.block<3, 1>(0, 4) = k.col(1) * duration_s;
+  step.yaw_rate_scale = k.col(1) * measured.yaw_rate_radps * duration_s;
+  return k;
+}
+
+}  // namespace
+
+bool is_standstill(const Twist2& twist) {
+  constexpr double kStandstill_mps = 1e-3;
+  constexpr double kStandstill_radps = 1e-4;
+  return std::abs(twist.speed_mps) < kStandstill_mps && std::abs(twist.yaw_rate_radps) < kStandstill_radps;
+}
+
+DeadReckoningStep dead_reckon(const Pose2& pose, const OdometryErrors& errors, const Twist2& measured,
+                              double duration_s, const DeadReckoningParameters& p) {
+  DeadReckoningStep step;
+  step.transition.setIdentity();
+  step.noise.setZero();
+  step.yaw_rate_scale.setZero();
+  if (p.estimate_odometry_errors) {
+    step.noise(3, 3) = square(p.odom_scale_walk) * duration_s;
+    step.noise(4, 4) = square(p.odom_yaw_bias_walk) * duration_s;
+  }
+  if (is_standstill(measured)) {
+    step.pose = pose;
+    return step;
+  }
+  const auto k = linearise(pose, errors, measured, duration_s, step);
+  if (!p.estimate_odometry_errors) step.transition.topRightCorner<3, 2>().setZero();
+  const Eigen::Vector2d sigma_v(square(p.odom_speed_noise * measured.speed_mps) * duration_s,
+                                square(p.odom_yaw_rate_noise * measured.yaw_rate_radps) * duration_s);
+  const Eigen::Vector3d sigma_n(square(p.odom_position_noise) * duration_s, square(p.odom_position_noise) * duration_s,
+                                square(p.odom_heading_noise) * duration_s);
+  step.noise.topLeftCorner<3, 3>() = k * sigma_v.asDiagonal() * k.transpose();
+  step.noise.topLeftCorner<3, 3>().diagonal() += sigma_n;
+  return step;
+}
+
+DeadReckoningStep dead_reckon(const Pose2& pose, const OdometryErrors& errors, const MotionStep& motion,
+                              const OdometryErrorParameters& p) {
+  const double dt = motion.duration_s;
+  DeadReckoningStep step;
+  step.noise.setZero();
+  step.yaw_rate_scale.setZero();
+  if (is_parked(motion.twist)) {
+    step.pose = pose;
+    step.transition.setIdentity();
+    step.noise(0, 0) = step.noise(1, 1) = square(p.parked_walk) * dt;
+    return step;
+  }
+  const auto k = linearise(pose, errors, motion.twist, dt, step);
+  // Of the noise of speed and second input, the distance (m) and the turn (rad); the disturbance turns afterwards.
+  Eigen::Matrix2d by_input;
+  if (motion.model == MotionModel::kBicycle) {
+    const double tangent = std::tan(motion.steering_rad);
+    by_input << 1.0, 0.0, tangent / motion.wheelbase_m,
+        motion.twist.speed_mps * (1.0 + tangent * tangent) / motion.wheelbase_m;
+  } else {
+    by_input.setIdentity();
+  }
+  const Eigen::Vector2d sigmas(motion.speed_sigma * dt, motion.input_sigma * dt);
+  const Eigen::Matrix<double, 3, 2> root = k * by_input * sigmas.asDiagonal();
+  step.noise.topLeftCorner<3, 3>() = root * root.transpose();
+  step.noise(0, 0) += square(p.position_walk) * dt;
+  step.noise(1, 1) += square(p.position_walk) * dt;
+  step.noise(2, 2) += square(motion.yaw_rate_sigma * dt) + square(p.heading_walk) * dt;
+  step.noise(3, 3) = square(p.speed_scale_walk) * dt;
+  step.noise(4, 4) = square(p.yaw_rate_bias_walk) * dt;
+  return step;
+}
+
+ErrorCovariance initial_error_covariance(const Eigen::Matrix3d& pose_covariance, const OdometryErrorParameters& p) {
+  ErrorCovariance covariance = ErrorCovariance::Zero();
+  covariance.topLeftCorner<3, 3>() = pose_covariance;
+  covariance(3, 3) = square(p.speed_scale_sigma);
+  covariance(4, 4) = square(p.yaw_rate_bias_sigma);
+  return covariance;
+}
+
+ErrorCovariance initial_error_covariance(const Eigen::Matrix3d& pose_covariance, const DeadReckoningParameters& p) {
+  ErrorCovariance covariance = ErrorCovariance::Zero();
+  covariance.topLeftCorner<3, 3>() = pose_covariance;
+  if (p.estimate_odometry_errors) {
+    covariance(3, 3) = square(p.odom_scale_sigma);
+    covariance(4, 4) = square(p.odom_yaw_bias_sigma);
+  }
+  return covariance;
+}
+
+}  // namespace urban_gnss

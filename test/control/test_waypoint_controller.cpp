@@ -1,0 +1,120 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "matchers.hpp"
+#include "package_directory.hpp"
+#include "urban_gnss_localization/control/waypoint_controller.hpp"
+
+namespace urban_gnss {
+namespace {
+
+WaypointControllerParameters square() {
+  WaypointControllerParameters parameters;
+  parameters.targets = {10.0, 0.0, 10.0, 10.0, 0.0, 10.0, 0.0, 0.0};
+  return parameters;
+}
+
+TEST(WaypointController, SteersByTheBearingRelativeToTheHeadingEq36) {
+  WaypointControllerParameters parameters = square();
+  parameters.steering_gain = 0.7;
+  parameters.max_steering = 1.5;
+  parameters.speed = 3.0;
+  WaypointController controller(parameters);
+  for (const double yaw : {-1.0, -0.2, 0.0, 0.5, 1.0}) {
+    const BicycleInput input = controller.steer({2.0, 3.0, yaw});
+    EXPECT_EQ(input.speed_mps, 3.0);
+    EXPECT_NEAR(input.steering_rad, 0.7 * (std::atan2(-3.0, 8.0) - yaw), 1e-14);
+  }
+}
+
+TEST(WaypointController, TurnsTheShorterWayAcrossPi) {
+  WaypointControllerParameters parameters;
+  parameters.targets = {-10.0, 1.0};
+  parameters.steering_gain = 1.0;
+  WaypointController controller(parameters);
+  const double bearing = std::atan2(1.0, -10.0);  // just below pi
+  EXPECT_NEAR(controller.steer({0.0, 0.0, -kPi + 0.1}).steering_rad, bearing - kPi - 0.1, 1e-14);
+  EXPECT_LT(controller.steer({0.0, 0.0, -kPi + 0.1}).steering_rad, 0.0);
+  EXPECT_GT(controller.steer({0.0, 0.0, kPi - 0.2}).steering_rad, 0.0);
+}
+
+TEST(WaypointController, ClampsTheSteering) {
+  WaypointControllerParameters parameters = square();
+  parameters.max_steering = 0.4;
+  WaypointController controller(parameters);
+  EXPECT_EQ(controller.steer({0.0, 0.0, 2.0}).steering_rad, -0.4);
+  EXPECT_EQ(controller.steer({0.0, 0.0, -2.0}).steering_rad, 0.4);
+}
+
+TEST(WaypointController, SwitchesAtItsDistanceAndCountsLaps) {
+  WaypointControllerParameters parameters = square();
+  parameters.laps = 2;
+  parameters.switch_distance = 0.5;
+  WaypointController controller(parameters, 1);
+  EXPECT_EQ(controller.current_target(), 1u);
+  controller.steer({10.0, 10.501, 0.0});
+  EXPECT_EQ(controller.current_target(), 1u);
+  const Pose2 corners[] = {{10.0, 10.499, 0.0}, {0.0, 10.0, 0.0}, {0.0, 0.0, 0.0}, {10.0, 0.0, 0.0}};
+  for (std::size_t k = 0; k < 8; ++k) {
+    EXPECT_FALSE(controller.finished());
+    EXPECT_EQ(controller.targets_reached(), k);
+    const BicycleInput input = controller.steer(corners[k % 4]);
+    EXPECT_EQ(input.speed_mps, k < 7 ? parameters.speed : 0.0);
+    EXPECT_EQ(controller.current_target(), (k + 2) % 4);
+  }
+  EXPECT_TRUE(controller.finished());
+  EXPECT_EQ(controller.steer({5.0, 5.0, 0.0}).speed_mps, 0.0);
+
+  parameters.laps = 0;
+  WaypointController endless(parameters);
+  for (int k = 0; k < 400; ++k) endless.steer(corners[(k + 3) % 4]);
+  EXPECT_EQ(endless.targets_reached(), 400u);
+  EXPECT_FALSE(endless.finished());
+}
+
+TEST(WaypointController, WithoutTargetsItStandsStill) {
+  WaypointController controller({});
+  EXPECT_TRUE(controller.finished());
+  const BicycleInput input = controller.steer({1.0, 2.0, 3.0});
+  EXPECT_EQ(input.speed_mps, 0.0);
+  EXPECT_EQ(input.steering_rad, 0.0);
+}
+
+TEST(WaypointController, HalfATargetIsAFault) {
+  std::vector<std::string> faults;
+  square().check(faults);
+  EXPECT_TRUE(faults.empty());
+  WaypointControllerParameters parameters;
+  parameters.targets = {1.0, 2.0, 3.0};
+  parameters.check(faults);
+  EXPECT_EQ(faults.size(), 1u);
+}
+
+// The paper's loop without any noise: 10 m/s, 100 Hz, eight targets on a ring of 15 m.
+TEST(WaypointController, ClosedLoopPassesTheEightTargets) {
+  const YAML::Node yaml = YAML::LoadFile(package_directory() + "/config/paper_field/waypoint_controller.yaml");
+  WaypointControllerParameters parameters;
+  EXPECT_TRUE(ParameterReader(yaml).read(parameters).finish().empty());
+  parameters.laps = 3;
+  WaypointController controller(parameters, 1);
+  const auto& targets = controller.targets();
+  ASSERT_EQ(targets.size(), 8u);
+  const Eigen::Vector2d way = targets[1] - targets[0];
+  Pose2 robot{targets[0].x(), targets[0].y(), std::atan2(way.y(), way.x())};
+  std::vector<double> nearest(8, 1e9);
+  double seconds = 0.0;
+  for (; !controller.finished() && seconds < 60.0; seconds += 0.01) {
+    const BicycleInput input = controller.steer(robot);
+    robot = move(robot, {input.speed_mps, yaw_rate(input, parameters.wheelbase)}, 0.01);
+    for (std::size_t i = 0; i < 8; ++i) nearest[i] = std::min(nearest[i], (robot.position() - targets[i]).norm());
+  }
+  EXPECT_TRUE(controller.finished());
+  EXPECT_EQ(controller.targets_reached(), 24u);
+  for (const double distance : nearest) EXPECT_LE(distance, 0.5);
+  EXPECT_NEAR(seconds, 3.0 * 16.0 * 15.0 * std::sin(kPi / 8.0) / 10.0, 1.0);  // the sides of the octagon
+}
+
+}  // namespace
+}  // namespace urban_gnss

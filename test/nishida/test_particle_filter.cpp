@@ -1,0 +1,300 @@
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <functional>
+#include <utility>
+
+#include "matchers.hpp"
+#include "urban_gnss_localization/localizers/nishida/particle_filter.hpp"
+#include "urban_gnss_localization/gnss/chi_squared.hpp"
+
+namespace urban_gnss {
+namespace {
+
+constexpr Twist2 kTwist{2.0, 0.3};
+constexpr double kStep_s = 0.1;
+
+FixMeasurement fix_at(double time_s, const Eigen::Vector2d& position, double sigma, double radius_m = 0.0) {
+  FixMeasurement fix;
+  fix.position = position;
+  fix.covariance = isotropic(sigma);
+  fix.bias_radius_m = radius_m;
+  fix.time_s = time_s;
+  return fix;
+}
+
+/// Ten seconds on an arc with a fix of 2 m every half second, the same for every filter: its estimates after each.
+/// From 6 s on the fixes lie 30 m aside.
+std::vector<Pose2> drive(ParticleFilter& filter, const Pose2& frame = {}) {
+  RandomEngine noise = make_engine(99);
+  Pose2 truth{1.0, -2.0, 0.5};
+  filter.initialize(pose_with_sigma(compose(frame, truth), 1.0, 0.2));
+  std::vector<Pose2> estimates;
+  for (int k = 1; k <= 100; ++k) {
+    truth = move(truth, kTwist, kStep_s);
+    filter.move(kTwist, kStep_s);
+    if (k % 5 == 0) {
+      const double east = draw_normal(noise), north = draw_normal(noise);
+      const double aside = k >= 60 ? 30.0 : 0.0;
+      const Eigen::Vector2d place = truth.position() + Eigen::Vector2d(2.0 * east + aside, 2.0 * north);
+      filter.correct(fix_at(k * kStep_s, transform_point(frame, place), 2.0, k >= 60 ? 30.0 : 1.0));
+    }
+    estimates.push_back(filter.pose());
+  }
+  return estimates;
+}
+
+std::vector<Pose2> drive(const ParticleFilterParameters& parameters, const MotionParameters& motion = {}) {
+  ParticleFilter filter(parameters, motion);
+  return drive(filter);
+}
+
+ParticleFilterParameters small(const std::string& yaml = "{}") {
+  ParticleFilterParameters parameters;
+  parameters.particle_count = 300;
+  return with(parameters, yaml);
+}
+
+TEST(ParticleFilter, SameSeedSameNumbersF26) {
+  for (const char* mode : {"mode: literal", "mode: paper", "mode: conventional"}) {
+    ParticleFilter filter(small(mode), {});
+    const std::vector<Pose2> first = drive(filter);
+    EXPECT_TRUE(drive(filter) == first) << mode;  // initialize starts the random numbers anew, too
+    EXPECT_TRUE(drive(small(mode)) == first) << mode;
+    ParticleFilterParameters other = small(mode);
+    other.seed = 2;
+    EXPECT_FALSE(drive(other) == first) << mode;
+  }
+}
+
+TEST(ParticleFilter, ModesMeanWhatTheySay) {
+  const auto form = [](const std::string& yaml) { return with(ParticleFilterParameters{}, yaml).likelihood_form(); };
+  const auto heading = [](const std::string& yaml) {
+    return with(ParticleFilterParameters{}, yaml).uses_gps_heading();
+  };
+  EXPECT_EQ(form("mode: literal"), LikelihoodForm::kPrinted);
+  EXPECT_EQ(form("mode: conventional"), LikelihoodForm::kPrinted);
+  EXPECT_EQ(form("mode: paper"), LikelihoodForm::kProduct);
+  EXPECT_EQ(form("{mode: paper, likelihood: sum}"), LikelihoodForm::kSum);
+  EXPECT_TRUE(heading("mode: literal"));
+  EXPECT_TRUE(heading("{mode: paper, likelihood: sum}"));
+  EXPECT_FALSE(heading("mode: paper"));
+  EXPECT_TRUE(heading("{mode: paper, use_gps_heading: always}"));
+  EXPECT_FALSE(heading("{mode: literal, use_gps_heading: never}"));
+  EXPECT_FALSE(ParticleFilter(small("mode: conventional"), {}).wants_bias());
+  EXPECT_TRUE(ParticleFilter(small("mode: paper"), {}).wants_bias());
+  EXPECT_EQ(ParticleFilter(small("mode: literal"), {}).mode(), "literal");
+}
+
+TEST(ParticleFilter, EveryParameterHasAnEffectF36) {
+  // What is changed, and against which other parameters.
+  const std::vector<std::pair<std::string, std::string>> changes = {
+      {"mode: literal", "{}"},
+      {"particle_count: 290", "{}"},
+      {"ring_share: 0.2", "{}"},
+      {"likelihood: sum", "{}"},
+      {"use_gps_heading: always", "{}"},
+      {"use_fix_covariance: false", "{}"},
+      {"direct_sigma: 1.0", "use_fix_covariance: false"},
+      {"shadow_sigma: 1.0", "{}"},
+      {"gps_heading_sigma: 1.0", "use_gps_heading: always"},
+      {"ess_threshold: 150.0", "{}"},
+      {"resampling: systematic", "ess_threshold: 150.0"},
+      {"estimate: mean", "{}"},
+      {"cluster_cell: 0.3", "{}"},
+      {"gate_probability: 0.5", "{mode: conventional, likelihood: product}"},
+      {"gate_timeout: 2.0", "{mode: conventional, likelihood: product}"},
+      {"seed: 2", "{}"},
+  };
+  // Those of the mode switching have a test of their own.
+  const std::size_t others = parameter_names(SwitchingModelParameters{}).size() -
+                             parameter_names(FixSigmaParameters{}).size() + 2;  // max_particles, merge_distance
+  EXPECT_EQ(changes.size() + others, parameter_names(ParticleFilterParameters{}).size());
+  for (const auto& [change, base] : changes) {
+    EXPECT_FALSE(drive(with(small(base), change)) == drive(small(base))) << change;
+  }
+}
+
+TEST(ParticleFilter, EveryMotionParameterHasAnEffectF36) {
+  const std::vector<std::pair<std::string, std::string>> changes = {
+      {"motion_model: bicycle", "{}"}, {"wheelbase: 2.0", "motion_model: bicycle"},
+      {"odom_alpha1: 0.002", "{}"},    {"odom_alpha2: 0.002", "{}"},
+      {"odom_alpha3: 0.002", "{}"},    {"odom_alpha4: 0.002", "{}"},
+      {"odom_alpha5: 0.002", "{}"},    {"odom_alpha6: 0.002", "{}"},
+      {"odom_noise_scale: 2.0", "{}"}, {"odom_noise_interval: 0.5", "{}"}};
+  EXPECT_EQ(changes.size(), parameter_names(MotionParameters{}).size());
+  for (const auto& [change, base] : changes) {
+    const MotionParameters motion = with(MotionParameters{}, base);
+    EXPECT_FALSE(drive(small(), with(motion, change)) == drive(small(), motion)) << change;
+  }
+}
+
+TEST(ParticleFilter, ParkedRobotWithGoodFixesStaysWhereItIs) {
+  for (const char* mode : {"{mode: conventional, likelihood: product}", "{mode: paper, shadow_sigma: 1.0}"}) {
+    ParticleFilterParameters parameters = with(ParticleFilterParameters{}, mode);
+    ParticleFilter filter(parameters, {});
+    RandomEngine noise = make_engine(7);
+    const Pose2 truth{10.0, 20.0, 1.0};
+    filter.initialize(pose_with_sigma(truth, 1.0, 0.1));
+    for (int k = 1; k <= 20; ++k) {
+      filter.move({0.0, 0.0}, 1.0);
+      const double east = 0.5 * draw_normal(noise), north = 0.5 * draw_normal(noise);
+      EXPECT_FALSE(
+          is_rejected(filter.correct(fix_at(k, truth.position() + Eigen::Vector2d(east, north), 0.5)).decision));
+    }
+    // Twenty fixes of 0.5 m leave 0.11 m; 4.5 of that, and the heading nothing but its start.
+    EXPECT_LT((filter.pose().position() - truth.position()).norm(), 0.5) << mode;
+    EXPECT_LT(std::abs(angle_difference(filter.pose().yaw, 1.0)), 0.45) << mode;
+    EXPECT_LT(std::sqrt(filter.estimate().covariance(0, 0)), 1.0);
+    EXPECT_GT(filter.health().cluster_mass, 0.5);
+  }
+}
+
+/// Root mean square error over 20 s in a shadow whose bias grows to 4 m along x in 4 s and stays; its length is known.
+double error_in_shadow(const std::string& mode, std::uint64_t seed) {
+  ParticleFilterParameters parameters = with(ParticleFilterParameters{}, mode);
+  parameters.model.fix.direct_sigma = 0.1;
+  parameters.model.fix.shadow_sigma = 0.3;
+  parameters.cluster_cell = 0.5;
+  parameters.seed = static_cast<int>(seed);
+  MotionParameters motion;
+  ParticleFilter filter(parameters, motion);
+  RandomEngine noise = make_engine(seed, 1);
+  Pose2 truth;
+  filter.initialize(pose_with_sigma(truth, 0.1, 0.02));
+  double squares = 0.0;
+  for (int k = 1; k <= 200; ++k) {
+    truth = move(truth, kTwist, kStep_s);
+    filter.move(kTwist, kStep_s);
+    const double bias = std::min(0.1 * k, 4.0);
+    const double east = draw_normal(noise), north = draw_normal(noise);
+    filter.correct(fix_at(k * kStep_s, truth.position() + Eigen::Vector2d(bias + 0.3 * east, 0.3 * north), 0.1, bias));
+    squares += (filter.pose().position() - truth.position()).squaredNorm() / 200.0;
+  }
+  return std::sqrt(squares);
+}
+
+TEST(ParticleFilter, KeepsTheTruthInABiasedShadowWhereTheConventionalFilterFollowsTheFix) {
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    const double conventional =
+        error_in_shadow("{mode: conventional, likelihood: product, gate_probability: 1.0}", seed);
+    const double paper = error_in_shadow("{mode: paper, ring_share: 0.01}", seed);
+    EXPECT_GT(conventional, 2.0) << seed;  // it follows the fix, which is 4 m off for 16 of 20 s
+    EXPECT_LT(paper, 0.5 * conventional) << seed;
+  }
+}
+
+TEST(ParticleFilter, ConventionalGateRejectsAJumpThenRestartsOnItF3) {
+  ParticleFilter filter(with(ParticleFilterParameters{}, "{mode: conventional, likelihood: product}"), {});
+  filter.initialize(pose_with_sigma({0.0, 0.0, 1.0}, 1.0, 0.1));
+  for (int k = 1; k <= 10; ++k) EXPECT_EQ(filter.correct(fix_at(k, {0.0, 0.0}, 2.0)).decision, FixDecision::kAccepted);
+  const Pose2 before = filter.pose();
+  for (int k = 11; k < 15; ++k) {
+    const FixVerdict verdict = filter.correct(fix_at(k, {300.0, 400.0}, 2.0));
+    EXPECT_EQ(verdict.decision, FixDecision::kRejectedGate);
+    EXPECT_NEAR(verdict.nis_threshold, chi_squared_quantile(0.99, 2), 1e-9);
+    EXPECT_GT(verdict.nis, verdict.nis_threshold);
+    EXPECT_EQ(filter.pose(), before);
+  }
+  const FixVerdict verdict = filter.correct(fix_at(15, {300.0, 400.0}, 2.0));
+  EXPECT_FALSE(is_rejected(verdict.decision));
+  EXPECT_NE(verdict.reason, "");
+  EXPECT_LT((filter.pose().position() - Eigen::Vector2d(300.0, 400.0)).norm(), 1.0);
+  EXPECT_NEAR(filter.pose().yaw, 1.0, 0.1);  // the heading is kept (F8)
+}
+
+TEST(ParticleFilter, LeverArmAndLatenessAreInTheAntennasPlace) {
+  // Two metres ahead of the base is where the fix belongs: the base is two metres behind it, whatever the heading.
+  for (const double yaw : {0.0, 2.0, -2.5}) {
+    ParticleFilter filter(with(ParticleFilterParameters{}, "{mode: conventional, likelihood: product}"), {});
+    filter.initialize(pose_with_sigma({0.0, 0.0, yaw}, 3.0, 0.01));
+    FixMeasurement fix = fix_at(1.0, {1.0, 1.0}, 0.3);
+    fix.antenna_in_body = {2.0, 0.0};
+    filter.correct(fix);
+    const Pose2& pose = filter.pose();
+    // 1000 particles of 3 m, of which some ten lie within the fix's 0.3 m: their mean has a sigma of 0.1 m.
+    EXPECT_NEAR(pose.x + 2.0 * std::cos(yaw), 1.0, 0.45);
+    EXPECT_NEAR(pose.y + 2.0 * std::sin(yaw), 1.0, 0.45);
+  }
+}
+
+TEST(ParticleFilter, HeadingOfTheFixCountsTheTurnSinceTheLastEq12) {
+  MotionParameters no_noise;
+  no_noise.odom_noise_scale = 0.0;
+  ParticleFilter filter(
+      with(ParticleFilterParameters{}, "{mode: conventional, likelihood: product, use_gps_heading: always}"), no_noise);
+  filter.initialize(pose_with_sigma({0.0, 0.0, 0.3}, 0.01, 0.5));
+  for (int k = 0; k < 5; ++k) filter.move({0.0, 1.0}, 0.1);
+  filter.correct(fix_at(1.0, {2.0, 0.0}, 10.0));
+  // Prior 0.8 +- 0.5 rad, and 0 + 0.5 rad +- 0.1 from the fix. The mean of some 200 particles has a sigma of 0.007.
+  EXPECT_NEAR(filter.pose().yaw, (0.8 / 0.25 + 0.5 / 0.01) / (1.0 / 0.25 + 1.0 / 0.01), 0.035);
+}
+
+TEST(ParticleFilter, FixThatNoParticleExplainsDoesNotAbortF30) {
+  ParticleFilter filter(small(), {});
+  filter.initialize(pose_with_sigma({1.0, 2.0, 0.5}, 1.0, 0.1));
+  const FixVerdict verdict = filter.correct(fix_at(1.0, {1e200, 0.0}, 1.0));
+  EXPECT_EQ(verdict.decision, FixDecision::kRejectedDegenerate);
+  EXPECT_TRUE(is_finite(filter.pose()));
+  EXPECT_TRUE(filter.estimate().covariance.allFinite());
+  EXPECT_FALSE(is_rejected(filter.correct(fix_at(2.0, {1.0, 2.0}, 1.0)).decision));
+  EXPECT_LT((filter.pose().position() - Eigen::Vector2d(1.0, 2.0)).norm(), 1.5);
+}
+
+TEST(ParticleFilter, ResamplesBelowItsThresholdOnly) {
+  for (const double threshold : {0.0, 300.0}) {
+    ParticleFilterParameters parameters = small();
+    parameters.ess_threshold = threshold;
+    ParticleFilter filter(parameters, {});
+    filter.initialize(pose_with_sigma({}, 1.0, 0.1));
+    filter.correct(fix_at(1.0, {0.5, 0.0}, 1.0));
+    EXPECT_GT(filter.effective_sample_size(), 1.0);
+    EXPECT_LT(filter.effective_sample_size(), 299.0);
+    EXPECT_EQ(effective_sample_size(filter.particles()) > 299.999, threshold > 0.0);
+    EXPECT_EQ(filter.health().effective_sample_size, filter.effective_sample_size());
+    EXPECT_EQ(filter.health().particle_count, 300u);
+  }
+}
+
+// Without a ring (its angles are drawn in the map) and with a start that is a point, every draw is in the robot's
+// frame: the whole run turns and shifts with the map.
+TEST(ParticleFilter, CommutesWithRotationAndTranslation) {
+  ParticleFilterParameters parameters = small("{ring_share: 0.0, estimate: mean}");
+  const auto run = [&](const Pose2& frame) {
+    ParticleFilter filter(parameters, {});
+    RandomEngine noise = make_engine(98);
+    Pose2 truth{1.0, -2.0, 0.5};
+    filter.initialize(pose_with_sigma(compose(frame, truth), 0.0, 0.3));
+    Eigen::Matrix2d covariance;
+    covariance << 4.0, 1.0, 1.0, 2.0;
+    const Eigen::Matrix2d rotation = Eigen::Rotation2Dd(frame.yaw).toRotationMatrix();
+    for (int k = 1; k <= 40; ++k) {
+      truth = move(truth, kTwist, 0.5);
+      filter.move(kTwist, 0.5);
+      const double east = draw_normal(noise), north = draw_normal(noise);
+      const Eigen::Vector2d place = truth.position() + Eigen::Vector2d(east, north);
+      FixMeasurement fix = fix_at(0.5 * k, transform_point(frame, place), 1.0, 1.0);
+      fix.covariance = rotation * covariance * rotation.transpose();
+      filter.correct(fix);
+    }
+    return filter.pose();
+  };
+  const Pose2 plain = run({});
+  RandomEngine engine = make_engine(5);
+  for (int trial = 0; trial < 5; ++trial) {
+    const Pose2 frame = random_pose(engine, 100.0);
+    EXPECT_TRUE(near(run(frame), compose(frame, plain), 1e-9));  // rounding of 100 m over 40 steps
+  }
+}
+
+TEST(ParticleFilter, RingCommutesWithTranslation) {
+  ParticleFilter here(small("estimate: mean"), {}), there(small("estimate: mean"), {});
+  const Pose2 frame{1000.0, -2000.0, 0.0};
+  const std::vector<Pose2> plain = drive(here);
+  const std::vector<Pose2> moved = drive(there, frame);
+  for (std::size_t k = 0; k < plain.size(); ++k) ASSERT_TRUE(near(moved[k], compose(frame, plain[k]), 1e-8)) << k;
+}
+
+}  // namespace
+}  // namespace urban_gnss

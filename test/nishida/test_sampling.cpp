@@ -1,0 +1,112 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "matchers.hpp"
+#include "urban_gnss_localization/localizers/nishida/sampling.hpp"
+
+namespace urban_gnss {
+namespace {
+
+TEST(SampleMotion, IsMoveNoisilyDrawByDraw) {
+  for (const MotionModel model : {MotionModel::kBicycle, MotionModel::kVelocity}) {
+    for (const Twist2 twist : {Twist2{3.0, 0.7}, Twist2{-1.0, 0.0}, Twist2{0.0, 0.4}, Twist2{0.0, 0.0}}) {
+      MotionParameters parameters;
+      parameters.motion_model = model;
+      parameters.wheelbase = 1.7;
+      const MotionStep step = make_motion_step(twist, 0.05, parameters);
+      RandomEngine engine = make_engine(1);
+      ParticleSet particles = random_particles(500, engine);
+      const ParticleSet before = particles;
+      RandomEngine array_engine = make_engine(2);
+      RandomEngine plain_engine = make_engine(2);
+      sample_motion(particles, step, array_engine);
+      for (std::size_t i = 0; i < particles.size(); ++i) {
+        const Pose2 plain = move_noisily(before.pose(i), step, draw_motion_noise(plain_engine));
+        ASSERT_TRUE(near(particles.pose(i), plain, 1e-13)) << i;  // metres, a dozen roundings of 1e-15
+      }
+      EXPECT_EQ(array_engine, plain_engine);
+      EXPECT_EQ(particles.log_weight, before.log_weight);
+    }
+  }
+}
+
+struct Ring {
+  static constexpr std::size_t kCount = 20000;
+  static constexpr double kRadius = 4.0;
+  static constexpr double kRadiusSigma = 0.05;
+  static constexpr double kWeightSigma = 2.5;
+  Pose2 predicted{7.0, -3.0, 0.9};
+};
+
+TEST(RingSampler, ReplacesExactlyItsShareEq22) {
+  for (const double share : {0.0, 0.01, 0.05, 0.333, 1.0}) {
+    RandomEngine engine = make_engine(3);
+    ParticleSet particles = random_particles(1000, engine, 0.5);
+    const ParticleSet before = particles;
+    RingSampler ring(particles.size(), share);
+    const auto expected = static_cast<std::size_t>(std::lround(share * 1000.0));
+    EXPECT_EQ(ring.count(), expected);
+    ring.sample(particles, {100.0, 100.0, 0.3}, 4.0, 0.05, 1.0, engine);
+    std::size_t replaced = 0;
+    for (std::size_t i = 0; i < particles.size(); ++i) {
+      if (particles.x[i] != before.x[i]) {
+        ++replaced;
+      } else {
+        EXPECT_EQ(particles.log_weight[i], before.log_weight[i]);
+        EXPECT_EQ(particles.yaw[i], before.yaw[i]);
+      }
+    }
+    EXPECT_EQ(replaced, expected) << share;  // distinct: none was drawn twice
+  }
+}
+
+TEST(RingSampler, ChoosesEveryParticleEquallyOften) {
+  // 400 calls of 5 % of 200: binomial with mean 20 and sigma 4.36 each. The sum of the squared deviations over 200
+  // particles, whose total is fixed, is chi-square with 199 degrees of freedom (sigma 20).
+  RandomEngine engine = make_engine(4);
+  RingSampler ring(200, 0.05);
+  std::vector<double> chosen(200, 0.0);
+  for (int call = 0; call < 400; ++call) {
+    ParticleSet particles(200);
+    ring.sample(particles, {}, 4.0, 0.05, 1.0, engine);
+    for (std::size_t i = 0; i < 200; ++i) chosen[i] += particles.x[i] != 0.0;
+  }
+  double statistic = 0.0;
+  for (const double count : chosen) statistic += (count - 20.0) * (count - 20.0) / (20.0 * 0.95);
+  EXPECT_NEAR(statistic, 199.0, 4.5 * 20.0);
+}
+
+TEST(RingSampler, DrawsRadiusAngleHeadingAndWeightOfEq23To26) {
+  const Ring r;
+  RandomEngine engine = make_engine(5);
+  ParticleSet particles(Ring::kCount);
+  RingSampler ring(Ring::kCount, 1.0);
+  ring.sample(particles, r.predicted, Ring::kRadius, Ring::kRadiusSigma, Ring::kWeightSigma, engine);
+  std::vector<double> radii, angles;
+  for (std::size_t i = 0; i < particles.size(); ++i) {
+    const Eigen::Vector2d way = particles.pose(i).position() - r.predicted.position();
+    const double rho = way.norm();
+    radii.push_back(rho);
+    angles.push_back(std::atan2(way.y(), way.x()));
+    ASSERT_EQ(particles.yaw[i], r.predicted.yaw);
+    const double s2 = Ring::kWeightSigma * Ring::kWeightSigma;
+    const double weight = 1.0 / (Ring::kCount * std::sqrt(2.0 * kPi * s2)) * std::exp(-0.5 * rho * rho / s2);
+    ASSERT_NEAR(std::exp(particles.log_weight[i]), weight, 1e-12 * weight);
+  }
+  EXPECT_TRUE(has_moments(radii, Ring::kRadius, Ring::kRadiusSigma * Ring::kRadiusSigma));
+  // Kolmogorov-Smirnov against the uniform distribution; 1.95 / sqrt(n) is exceeded once in a thousand.
+  std::sort(angles.begin(), angles.end());
+  double largest = 0.0;
+  for (std::size_t i = 0; i < angles.size(); ++i) {
+    const double expected = (angles[i] + kPi) / (2.0 * kPi);
+    largest = std::max(
+        {largest, std::abs(expected - i / double(Ring::kCount)), std::abs(expected - (i + 1) / double(Ring::kCount))});
+  }
+  EXPECT_LT(largest, 1.95 / std::sqrt(double(Ring::kCount)));
+}
+
+}  // namespace
+}  // namespace urban_gnss

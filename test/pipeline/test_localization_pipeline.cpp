@@ -1,0 +1,383 @@
+#include "pipeline_rig.hpp"
+#include "urban_gnss_localization/localizers/switching/imm_ekf.hpp"
+#include "urban_gnss_localization/localizers/switching/switching_particle_filter.hpp"
+
+namespace urban_gnss {
+namespace {
+
+TEST(LocalizationPipeline, FixWaitsForTheOdometryOfItsStamp) {
+  Rig rig(kGiven);
+  rig.drive(0.0);
+  rig.drive(0.9);
+  rig.fix(1.0);
+  EXPECT_TRUE(rig.fake->fixes.empty());
+  rig.drive(0.95);
+  EXPECT_TRUE(rig.fake->fixes.empty());
+  rig.drive(1.0);
+  ASSERT_EQ(rig.fake->fixes.size(), 1u);
+  EXPECT_LT(rig.fake->fixes[0].antenna_in_body.norm(), 1e-12);
+  EXPECT_NEAR(rig.fake->fixes[0].time_s, 1001.0, 1e-9);
+  EXPECT_LT((rig.fake->fixes[0].position - Rig::truth(1.0).position()).norm(), 1e-6);
+  EXPECT_EQ(rig.pipeline.report().fixes_used, 1u);
+}
+
+TEST(LocalizationPipeline, LateFixIsComparedWithThePoseAtItsOwnStampF23) {
+  Rig rig(kGiven);
+  rig.pipeline.set_antenna_offset({0.4, -0.3});
+  for (int k = 0; k <= 40; ++k) rig.drive(0.1 * k);
+  for (const double time : {2.0, 2.137, 3.95, 4.0}) {
+    rig.fix(time, {0.0, 0.0}, {0.4, -0.3});
+    // Where the antenna was, seen from where the base is now: with the true pose it is where the fix is.
+    const FixMeasurement& fix = rig.fake->fixes.back();
+    EXPECT_NEAR(fix.time_s, 1000.0 + time, 1e-9);
+    EXPECT_LT((transform_point(Rig::truth(4.0), fix.antenna_in_body) - fix.position).norm(), 1e-6) << time;
+    const Pose2 back = between(Rig::truth(4.0), Rig::truth(time));
+    EXPECT_LT((fix.antenna_in_body - transform_point(back, {0.4, -0.3})).norm(), 1e-12) << time;
+  }
+}
+
+TEST(LocalizationPipeline, FixOlderThanTheOdometryIsStale) {
+  Rig rig(kGiven);
+  for (int k = 0; k <= 200; ++k) rig.drive(0.1 * k);
+  rig.fix(5.0);
+  EXPECT_TRUE(rig.fake->fixes.empty());
+  ASSERT_EQ(rig.pipeline.report().fixes_rejected, 1u);
+  EXPECT_EQ(rig.pipeline.report().last_fix.decision, FixDecision::kRejectedStale);
+  rig.fix(19.0);
+  EXPECT_EQ(rig.fake->fixes.size(), 1u);
+}
+
+TEST(LocalizationPipeline, WaitsForTheBiasAndUsesIt) {
+  Rig rig(kGiven, true);
+  rig.run(0.0, 1.0);  // fixes at 0 and 1 s
+  EXPECT_TRUE(rig.fake->fixes.size() <= 1u);
+  rig.bias(0.0, 0.5);
+  rig.bias(1.0, 3.0);
+  ASSERT_GE(rig.fake->fixes.size(), 1u);
+  EXPECT_EQ(rig.fake->fixes.back().bias_radius_m, 3.0);
+  EXPECT_NEAR(rig.fake->fixes.back().time_s, 1001.0, 1e-9);
+  EXPECT_EQ(rig.pipeline.report().bias_radius_m, 3.0);
+
+  // The bias before the odometry, and before the fix: the same.
+  rig.bias(2.0, 4.0);
+  rig.run(1.1, 2.0);
+  EXPECT_EQ(rig.fake->fixes.back().bias_radius_m, 4.0);
+  EXPECT_NEAR(rig.fake->fixes.back().time_s, 1002.0, 1e-9);
+}
+
+TEST(LocalizationPipeline, WithoutABiasTheLastOneIsUsedAfterTheTimeout) {
+  Rig rig(kGiven, true);
+  rig.run(0.1, 1.0);
+  rig.bias(1.0, 3.0);
+  ASSERT_EQ(rig.fake->fixes.size(), 1u);
+  rig.run(1.1, 2.0);
+  rig.run(2.1, 2.4, false);
+  EXPECT_EQ(rig.fake->fixes.size(), 1u);
+  EXPECT_EQ(rig.pipeline.bias_query()->fix.stamp, Rig::at(2.0));
+  rig.drive(2.5);
+  ASSERT_EQ(rig.fake->fixes.size(), 2u);
+  EXPECT_EQ(rig.fake->fixes.back().bias_radius_m, 3.0);
+  // It is still compared with the pose at its own stamp.
+  const Eigen::Vector2d antenna = transform_point(Rig::truth(2.5), rig.fake->fixes.back().antenna_in_body);
+  EXPECT_LT((antenna - Rig::truth(2.0).position()).norm(), 1e-9);
+  EXPECT_TRUE(has_event(rig.pipeline, PipelineEvent::Level::kWarn, "gps/bias"));
+  rig.bias(2.0, 9.0);  // too late, and forgotten
+  rig.run(2.6, 3.0);
+  rig.bias(3.0, 5.0);
+  EXPECT_EQ(rig.fake->fixes.back().bias_radius_m, 5.0);
+}
+
+TEST(LocalizationPipeline, BiasFromAnotherTimeDoesNotBlockTheOthers) {
+  Rig rig(kGiven, true);
+  rig.run(0.1, 0.9);
+  rig.bias(5000.0, 9.0);  // of before the clock was set back, published late
+  rig.run(1.0, 1.0);
+  rig.bias(1.0, 3.0);
+  ASSERT_EQ(rig.fake->fixes.size(), 1u);
+  EXPECT_EQ(rig.fake->fixes[0].bias_radius_m, 3.0);
+}
+
+TEST(LocalizationPipeline, BiasOfBeforeTheClockWasSetBackIsForgottenF21) {
+  Rig rig(kGiven, true);
+  rig.run(5.0, 6.0, false);
+  rig.bias(7.0, 9.0);
+  rig.run(1.0, 7.0);
+  ASSERT_FALSE(rig.fake->fixes.empty());
+  EXPECT_NEAR(rig.fake->fixes.back().time_s, 1006.0, 1e-9);  // that of 7 s waits for its own bias
+}
+
+TEST(LocalizationPipeline, FixThatTheBiasFilterRejectsIsNotUsed) {
+  Rig rig(kGiven, true);
+  rig.run(0.1, 1.0);
+  rig.bias(1.0, 3.0, FixDecision::kRejectedGate);
+  EXPECT_TRUE(rig.fake->fixes.empty());
+  EXPECT_EQ(rig.pipeline.report().fixes_rejected, 1u);
+  EXPECT_EQ(rig.pipeline.report().last_fix.decision, FixDecision::kRejectedGate);
+  EXPECT_EQ(rig.pipeline.report().last_fix.stamp, Rig::at(1.0));
+}
+
+TEST(LocalizationPipeline, BiasQueryPredictsTheAntennaAtTheFix) {
+  Rig rig(kGiven, true);
+  rig.pipeline.set_antenna_offset({0.4, -0.3});
+  rig.run(0.1, 1.0);
+  rig.run(1.1, 1.3, false);
+  const auto query = rig.pipeline.bias_query();
+  ASSERT_TRUE(query);
+  EXPECT_EQ(query->fix.stamp, Rig::at(1.0));
+  // The filter starts at the first message, at 0.1 s, from the given pose.
+  const Pose2 base = compose(inverse(Rig::truth(0.1)), Rig::truth(1.0));
+  EXPECT_LT((query->predicted_antenna_position - transform_point(base, {0.4, -0.3})).norm(), 1e-9);
+}
+
+TEST(LocalizationPipeline, NonFiniteMessagesChangeNothingF25) {
+  const auto run = [](bool with_bad_ones) {
+    Rig rig(kGiven);
+    std::vector<LocalizationOutput> outputs;
+    for (int k = 0; k <= 100; ++k) {
+      if (with_bad_ones) {
+        for (const double bad : {kNaN, kInfinity, -kInfinity, 1e300}) {
+          for (int field = 0; field < 4; ++field) {
+            OdometrySample sample = Rig::odometry(0.1 * k);
+            double* const fields[] = {&sample.pose.x, &sample.pose.y, &sample.twist.speed_mps,
+                                      &sample.twist.yaw_rate_radps};
+            *fields[field] = bad;
+            rig.pipeline.add_odometry(sample);
+          }
+          rig.pipeline.add_imu_yaw_rate(Rig::at(0.1 * k), bad);
+          RawFix fix = raw_fix(Rig::at(0.1 * k), {0.0, 0.0});
+          fix.position.latitude_deg = bad;
+          rig.pipeline.add_fix(fix);
+          fix = raw_fix(Rig::at(0.1 * k), {0.0, 0.0});
+          fix.position.longitude_deg = bad;
+          rig.pipeline.add_fix(fix);
+        }
+        // Receivers without a fix are known to send stamp 0 and place 0.
+        RawFix empty;
+        empty.has_fix = false;
+        rig.pipeline.add_fix(empty);
+      }
+      if (k % 10 == 0) rig.fix(0.1 * k);
+      rig.drive(0.1 * k);
+    }
+    for (const LocalizationOutput& output : rig.pipeline.take_outputs()) outputs.push_back(output);
+    return std::make_pair(outputs, rig.pipeline.report());
+  };
+  const auto [clean, clean_report] = run(false);
+  const auto [dirty, dirty_report] = run(true);
+  EXPECT_EQ(clean_report.fixes_used, dirty_report.fixes_used);
+  EXPECT_EQ(clean_report.fixes_rejected, 0u);
+  EXPECT_EQ(dirty_report.fixes_rejected, 101u * 9u);
+  ASSERT_EQ(clean.size(), dirty.size());
+  for (std::size_t i = 0; i < clean.size(); ++i) {
+    ASSERT_EQ(clean[i].stamp, dirty[i].stamp);
+    ASSERT_EQ(clean[i].estimate.pose, dirty[i].estimate.pose);
+  }
+}
+
+TEST(LocalizationPipeline, NonFiniteCovarianceOrAltitudeIsReplacedF15) {
+  Rig rig(kGiven);
+  rig.drive(0.0);
+  RawFix fix = raw_fix(Rig::at(0.5), {1.0, 2.0});
+  fix.position.altitude_m = kNaN;
+  fix.covariance.setConstant(kNaN);
+  rig.pipeline.add_fix(fix);
+  rig.drive(1.0);
+  ASSERT_EQ(rig.fake->fixes.size(), 1u);
+  EXPECT_LT((rig.fake->fixes[0].covariance - isotropic(4.0)).norm(), 1e-12);
+  EXPECT_TRUE(rig.fake->fixes[0].position.allFinite());
+  EXPECT_EQ(rig.pipeline.report().last_fix.decision, FixDecision::kInflated);
+}
+
+TEST(LocalizationPipeline, OutputStampsAscendF22) {
+  Rig rig(kGiven);
+  const double times[] = {0.0, 0.1, 0.1, 0.05, 0.2, 0.2, 0.15, 0.3, 0.1, 0.4};
+  for (const double time : times) {
+    rig.drive(time);
+    rig.drive(time);
+  }
+  const auto outputs = rig.pipeline.take_outputs();
+  ASSERT_EQ(outputs.size(), 5u);
+  for (std::size_t i = 0; i < 5; ++i) {
+    EXPECT_EQ(outputs[i].stamp, Rig::at(0.1 * double(i)));
+    EXPECT_TRUE(near(outputs[i].estimate.pose, Rig::truth(0.1 * double(i)), 1e-9));
+    EXPECT_TRUE(near(compose(map_to_odometry(outputs[i]), outputs[i].odometry_pose), outputs[i].estimate.pose, 1e-9));
+  }
+  EXPECT_EQ(rig.fake->moves.size(), 4u);
+}
+
+TEST(LocalizationPipeline, StampsAscendAcrossAResetThatIsAskedForF22) {
+  Rig rig(kGiven);
+  rig.drive(0.0);
+  rig.drive(5.0);
+  rig.pipeline.take_outputs();
+  rig.pipeline.reset("a test");
+  rig.drive(5.0);  // came twice
+  EXPECT_TRUE(rig.pipeline.take_outputs().empty());
+  rig.drive(5.1);
+  EXPECT_EQ(rig.pipeline.take_outputs().size(), 1u);
+  // A recording that starts over is still seen as that.
+  rig.drive(0.0);
+  EXPECT_TRUE(has_event(rig.pipeline, PipelineEvent::Level::kWarn, "jumped back"));
+  EXPECT_EQ(rig.pipeline.take_outputs().size(), 1u);
+}
+
+TEST(LocalizationPipeline, ClockSetBackGivesTheSameRunAgainF21) {
+  for (const auto& [with_datum, mode] : {std::pair{false, ParticleFilterMode::kPaper},
+                                         {true, ParticleFilterMode::kPaper},
+                                         {true, ParticleFilterMode::kSwitching}}) {
+    LocalizationParameters parameters;
+    if (with_datum) parameters.datum.datum = {33.0, 130.0, 20.0};
+    ParticleFilterParameters filter;
+    filter.mode = mode;
+    filter.particle_count = 100;
+    Rig rig(parameters, make_particle_filter(filter, MotionParameters{}));
+    std::vector<LocalizationOutput> passes[2];
+    for (auto& pass : passes) {
+      rig.run(0.0, 60.0);
+      pass = rig.pipeline.take_outputs();
+    }
+    EXPECT_TRUE(has_event(rig.pipeline, PipelineEvent::Level::kWarn, "jumped back"));
+    ASSERT_GT(passes[0].size(), 200u);
+    ASSERT_EQ(passes[0].size(), passes[1].size());
+    for (std::size_t i = 0; i < passes[0].size(); ++i) {
+      ASSERT_EQ(passes[0][i].stamp, passes[1][i].stamp);
+      ASSERT_EQ(passes[0][i].estimate.pose, passes[1][i].estimate.pose);
+      ASSERT_EQ(passes[0][i].estimate.covariance, passes[1][i].estimate.covariance);
+    }
+  }
+}
+
+TEST(LocalizationPipeline, TracksWithTheParticleFilter) {
+  LocalizationParameters parameters;
+  parameters.datum.datum = {33.0, 130.0, 20.0};
+  for (const auto mode :
+       {ParticleFilterMode::kConventional, ParticleFilterMode::kPaper, ParticleFilterMode::kSwitching}) {
+    ParticleFilterParameters filter;
+    filter.mode = mode;
+    filter.likelihood = LikelihoodChoice::kProduct;
+    filter.particle_count = 500;
+    Rig rig(parameters, make_particle_filter(filter, MotionParameters{}));
+    rig.run(0.0, 120.0);
+    const auto outputs = rig.pipeline.take_outputs();
+    ASSERT_FALSE(outputs.empty());
+    // Fixes without error and of a declared 1 m: within a metre or two of the truth.
+    EXPECT_LT((outputs.back().estimate.pose.position() - Rig::truth(120.0).position()).norm(), 2.0);
+    EXPECT_LT(std::abs(angle_difference(outputs.back().estimate.pose.yaw, Rig::truth(120.0).yaw)), 0.3);
+    EXPECT_EQ(rig.state(), LocalizationState::kTracking);
+  }
+}
+
+TEST(LocalizationPipeline, TracksWithTheInteractingModels) {
+  LocalizationParameters parameters;
+  parameters.datum.datum = {33.0, 130.0, 20.0};
+  Rig rig(parameters, std::make_unique<ImmEkf>(ImmEkfParameters{}, MotionParameters{}));
+  rig.run(0.0, 120.0);
+  const auto outputs = rig.pipeline.take_outputs();
+  ASSERT_FALSE(outputs.empty());
+  EXPECT_LT((outputs.back().estimate.pose.position() - Rig::truth(120.0).position()).norm(), 2.0);
+  EXPECT_LT(std::abs(angle_difference(outputs.back().estimate.pose.yaw, Rig::truth(120.0).yaw)), 0.3);
+  EXPECT_EQ(rig.state(), LocalizationState::kTracking);
+}
+
+/// What users see of half a minute in which everything happens that a parameter is about.
+std::string trace(const std::string& base, const std::string& change, bool wants_bias = false) {
+  LocalizationParameters parameters = with(with(LocalizationParameters{}, base), change);
+  auto localizer = std::make_unique<FakeLocalizer>();
+  localizer->wants = wants_bias;
+  Rig rig(parameters, std::move(localizer));
+  std::ostringstream out;
+  const auto note = [&] {
+    for (const auto& o : rig.pipeline.take_outputs()) out << o.stamp.count() << ' ' << o.estimate.pose.yaw << '\n';
+    for (const auto& v : rig.pipeline.take_verdicts()) out << int(v.decision) << v.covariance_clamped << '\n';
+    const LocalizationReport report = rig.pipeline.report();
+    out << int(report.state) << report.healthy << report.heading_converged << ' ' << report.fixes_rejected << '\n';
+  };
+  RandomEngine noise = make_engine(1);
+  for (int k = 0; k <= 400; ++k) {
+    const double time = 0.1 * k;
+    rig.pipeline.add_imu_yaw_rate(Rig::at(time), 0.12);
+    if (k > 200) {
+      RawVelocity velocity = Rig::velocity(time);
+      if (k % 2 == 0) velocity.covariance.setZero();
+      rig.pipeline.add_velocity(velocity);
+    }
+    if (k % 10 == 0 && k != 150 && (k < 160 || k > 190)) {
+      const Eigen::Vector2d error(0.5 * draw_normal(noise), 0.5 * draw_normal(noise));
+      RawFix fix = raw_fix(Rig::at(time), Rig::truth(time).position() + error, k % 20 == 0 ? 0.1 : 1.0);
+      if (k % 30 == 0) fix.covariance_type = CovarianceType::kUnknown;
+      if (k == 270) fix = raw_fix(Rig::at(time), {3000.0, 0.0});
+      if (k == 280) fix.covariance *= 1e6;
+      rig.pipeline.add_fix(fix);
+    }
+    if (k == 30 || k == 350) rig.pipeline.add_satellites(Rig::at(time), {});  // the next fix has none
+    if (k < 300 || k > 315) rig.drive(time);
+    if (k == 350) rig.drive(time - 0.7);  // late, and not a clock that was set back
+    note();
+  }
+  for (const FixMeasurement& fix : rig.fake->fixes) {
+    out << fix.antenna_in_body.transpose() << ' ' << fix.covariance(0, 0) << ' ' << fix.position.transpose() << '\n';
+  }
+  for (const VelocityMeasurement& velocity : rig.fake->velocities) out << velocity.covariance(0, 0) << '\n';
+  for (const PoseEstimate& start : rig.fake->starts) out << start.pose.x << ' ' << start.covariance << '\n';
+  rig.run(0.0, 1.0);
+  note();
+  return out.str();
+}
+
+TEST(LocalizationPipeline, EveryParameterHasAnEffectF36) {
+  const std::string datum = "datum: [33.0, 130.0, 20.0]";
+  const std::string given = kGiven;
+  const std::string far_off = "{datum: [33.0, 130.0, 20.0], initial_pose: [150.0, 0.0, 0.0]}";
+  const std::map<std::string, std::pair<std::string, std::string>> changes = {
+      {"initial_pose", {datum, "[0.0, 0.0, 0.5]"}},
+      {"initial_position_sigma", {given, "2.0"}},
+      {"initial_heading_sigma", {given, "0.1"}},
+      {"antenna_offset", {given, "[1.0, 0.0]"}},
+      {"use_imu_yaw_rate", {given, "false"}},
+      {"use_gps_velocity", {given, "false"}},
+      {"velocity_sigma_default", {given, "0.5"}},
+      {"velocity_sigma_floor", {given, "0.2"}},
+      {"odometry_gap", {given, "1.0"}},
+      {"max_bias_radius", {far_off, "200.0"}},
+      {"lost_timeout", {far_off, "5.0"}},
+      {"fix_timeout", {given, "3.0"}},
+      {"bias_timeout", {given, "0.2"}},
+      {"satellites_timeout", {given, "0.2"}},
+      {"time_jump", {given, "0.5"}},
+      {"reset_on_time_jump", {given, "false"}},
+      {"heading_converged_sigma", {given, "0.1"}},
+      {"datum", {"{}", "[33.0, 130.0, 20.0]"}},
+      {"datum_fix_count", {"{}", "3"}},
+      {"datum_max_spread", {"{}", "2.0"}},
+      {"fix_sigma_default", {given, "7.0"}},
+      {"fix_sigma_floor", {given, "0.5"}},
+      {"fix_sigma_ceiling", {given, "100.0"}},
+      {"fix_covariance_scale", {given, "4.0"}},
+      {"max_distance_from_datum", {given, "1000.0"}},
+      {"initialization_heading_sigma", {datum, "0.05"}},
+      {"initialization_timeout", {datum, "2.0"}},
+      {"initialization_window", {datum, "2.0"}},
+  };
+  for (const std::string& name : parameter_names(LocalizationParameters{})) {
+    const auto found = changes.find(name);
+    ASSERT_NE(found, changes.end()) << name << " is not examined";
+    const auto& [base, value] = found->second;
+    const bool wants_bias = name == "bias_timeout";
+    EXPECT_NE(trace(base, name + ": " + value, wants_bias), trace(base, "{}", wants_bias)) << name;
+  }
+}
+
+TEST(LocalizationPipeline, ParametersAreChecked) {
+  std::vector<std::string> faults;
+  LocalizationParameters{}.check(faults);
+  EXPECT_TRUE(faults.empty());
+  LocalizationParameters parameters;
+  parameters.initial_pose = {1.0, 2.0};
+  parameters.antenna_offset = {1.0};
+  parameters.datum.datum = {1.0};
+  parameters.check(faults);
+  EXPECT_EQ(faults.size(), 3u);
+}
+
+}  // namespace
+}  // namespace urban_gnss
