@@ -19,7 +19,7 @@ log=$workspace/build.log
 noetic_packages="
   build-essential cmake libbenchmark-dev libboost-dev libcli11-dev libeigen3-dev libgeographic-dev libgtest-dev
   libpcl-dev libyaml-cpp-dev nlohmann-json3-dev python3-matplotlib python3-numpy
-  ros-noetic-catkin ros-noetic-diagnostic-updater ros-noetic-dynamic-reconfigure ros-noetic-geometry-msgs ros-noetic-message-generation
+  ros-noetic-catkin ros-noetic-diagnostic-msgs ros-noetic-diagnostic-updater ros-noetic-dynamic-reconfigure ros-noetic-geometry-msgs ros-noetic-message-generation
   ros-noetic-message-runtime ros-noetic-nav-msgs ros-noetic-nodelet ros-noetic-pluginlib ros-noetic-rosbag ros-noetic-rosbag-storage ros-noetic-rosbash
   ros-noetic-roscpp ros-noetic-rosgraph-msgs ros-noetic-roslaunch ros-noetic-roslib ros-noetic-rosnode ros-noetic-rospy
   ros-noetic-rostest ros-noetic-rostopic ros-noetic-rviz ros-noetic-sensor-msgs ros-noetic-std-msgs ros-noetic-std-srvs
