@@ -4,7 +4,7 @@
 #   screenshot_rviz.sh FILE.png TOPIC CONDITION LAUNCH_FILE [ARG:=VALUE]...
 #
 # The picture is taken as soon as a message m on TOPIC meets CONDITION (Python, as in rostopic echo --filter). The
-# workspace's setup.bash must have been sourced. Needs xvfb and imagemagick. The pictures in docs/:
+# workspace's setup.bash must have been sourced. Needs `apt-get install xvfb xauth imagemagick`. The pictures in docs/:
 #
 #   screenshot_rviz.sh docs/rviz_demo.png /ground_truth/odom \
 #     'm.header.stamp.to_sec() > 8 and m.pose.pose.position.x < -13' demo.launch real_time_factor:=0.2

@@ -7,8 +7,8 @@
 #   --no-install  leave the system's packages alone
 #   --jobs N      compile N files at once (default: a processor and 1.5 GB of memory for each)
 #
-# Debian 12 gets the packages of scripts/apt-debian.txt, Ubuntu 20.04 with /opt/ros/noetic those named below; apt-get runs
-# through sudo unless you are root. The build's output is in .workspace/build.log.
+# Debian 12 gets the packages in the first column of scripts/apt-debian.txt, Ubuntu 20.04 with /opt/ros/noetic those in the
+# second; apt-get runs through sudo unless you are root. The build's output is in .workspace/build.log.
 set -eo pipefail  # no -u: ROS's setup files read variables that are not set
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
@@ -16,14 +16,6 @@ workspace=$root/.workspace
 build=$workspace/build
 devel=$workspace/devel
 log=$workspace/build.log
-noetic_packages="
-  build-essential cmake libbenchmark-dev libboost-dev libcli11-dev libeigen3-dev libgeographic-dev libgtest-dev
-  libpcl-dev libyaml-cpp-dev nlohmann-json3-dev python3-matplotlib python3-numpy
-  ros-noetic-catkin ros-noetic-diagnostic-updater ros-noetic-dynamic-reconfigure ros-noetic-geometry-msgs ros-noetic-message-generation
-  ros-noetic-message-runtime ros-noetic-nav-msgs ros-noetic-nodelet ros-noetic-pluginlib ros-noetic-rosbag ros-noetic-rosbag-storage ros-noetic-rosbash
-  ros-noetic-roscpp ros-noetic-rosgraph-msgs ros-noetic-roslaunch ros-noetic-roslib ros-noetic-rosnode ros-noetic-rospy
-  ros-noetic-rostest ros-noetic-rostopic ros-noetic-rviz ros-noetic-sensor-msgs ros-noetic-std-msgs ros-noetic-std-srvs
-  ros-noetic-tf2 ros-noetic-tf2-msgs ros-noetic-tf2-ros ros-noetic-topic-tools ros-noetic-visualization-msgs"
 
 usage() { sed -n '2,/^set /{/^set /d;s/^# \{0,1\}//;p}' "$0"; }
 
@@ -65,11 +57,9 @@ logged() {
 }
 
 packages_wanted() {
-  if [ -d /opt/ros/noetic ]; then
-    printf '%s\n' $noetic_packages
-  else
-    sed 's/#.*//' "$root/scripts/apt-debian.txt" | tr -s ' \t' '\n' | sed '/^$/d'
-  fi
+  local column=1
+  if [ -d /opt/ros/noetic ]; then column=2; fi
+  sed 's/#.*//' "$root/scripts/apt-debian.txt" | awk -v column=$column 'NF && !seen[$column]++ {print $column}'
 }
 
 packages_missing() {
