@@ -287,8 +287,6 @@ const char* to_string(VisibilitySource source) {
 }
 
 void GnssCovarianceParameters::check(std::vector<std::string>& faults) const {
-  memory.check(faults);
-  filter.check(faults);
   if (!(nlos_if_free <= nlos_if_unknown && nlos_if_unknown <= nlos_if_blocked)) {
     faults.push_back("nlos_if_unknown = " + std::to_string(nlos_if_unknown) + ": must lie between nlos_if_free = " +
                      std::to_string(nlos_if_free) + " and nlos_if_blocked = " + std::to_string(nlos_if_blocked));

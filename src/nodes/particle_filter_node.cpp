@@ -11,13 +11,12 @@ using namespace urban_gnss;
 namespace {
 
 struct CloudParameters {
-  double particle_cloud_rate{5.0};  ///< Hz of stamps at which the particles are published; 0 never
+  double particle_cloud_rate{5.0};
 
-  template <class V>
-  void visit(V& v) {
-    v("particle_cloud_rate", particle_cloud_rate, non_negative());
+  void visit(ParameterVisitor& v) {
+    v("particle_cloud_rate", particle_cloud_rate, non_negative(), "Hz",
+      "of stamps at which the particles are published; 0 never");
   }
-  void check(std::vector<std::string>&) const {}
 };
 
 class ParticleFilterNode {

@@ -8,8 +8,6 @@ namespace urban_gnss {
 
 void BiasPipelineParameters::check(std::vector<std::string>& faults) const {
   if (antenna_offset.size() != 2) faults.push_back("antenna_offset: must be x and y (m)");
-  fix.check(faults);
-  bias.check(faults);
 }
 
 BiasPipeline::BiasPipeline(const BiasPipelineParameters& parameters)

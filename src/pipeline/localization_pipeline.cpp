@@ -22,9 +22,6 @@ void LocalizationParameters::check(std::vector<std::string>& faults) const {
                      " numbers; must be x, y (m) and yaw (rad), or empty");
   }
   if (antenna_offset.size() != 2) faults.push_back("antenna_offset: must be x and y (m)");
-  datum.check(faults);
-  fix.check(faults);
-  heading.check(faults);
 }
 
 Pose2 map_to_odometry(const LocalizationOutput& output) {

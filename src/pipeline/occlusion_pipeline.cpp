@@ -47,17 +47,6 @@ void OcclusionParameters::check(std::vector<std::string>& faults) const {
   if (antenna_offset.size() != 3) faults.push_back("antenna_offset: must be x, y and z (m)");
 }
 
-void OcclusionPipelineParameters::check(std::vector<std::string>& faults) const {
-  occlusion.check(faults);
-  visibility.check(faults);
-  local_map.check(faults);
-  voxels.check(faults);
-  aligner.check(faults);
-  voxel_tracer.check(faults);
-  covariance.check(faults);
-  consistency.check(faults);
-}
-
 OcclusionPipeline::OcclusionPipeline(const OcclusionPipelineParameters& parameters)
     : parameters_(parameters),
       local_map_(parameters.local_map, parameters.voxels, parameters.aligner),

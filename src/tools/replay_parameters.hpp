@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "urban_gnss_localization/common/parameters.hpp"
+#include "urban_gnss_localization/parameters/parameter_reader.hpp"
 #include "urban_gnss_localization/localizers/kim/complementary_ekf.hpp"
 #include "urban_gnss_localization/localizers/switching/imm_ekf.hpp"
 #include "urban_gnss_localization/localizers/switching/switching_particle_filter.hpp"

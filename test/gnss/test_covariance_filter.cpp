@@ -188,7 +188,7 @@ TEST(CovarianceFilter, ThresholdMustBeBelowInfinity) {
   CovarianceFilterParameters p;
   p.sigma_threshold = 700.0;
   std::vector<std::string> faults;
-  p.check(faults);
+  faults = faults_of(p);
   ASSERT_EQ(faults.size(), 1u);
   EXPECT_NE(faults[0].find("sigma_threshold"), std::string::npos);
 }

@@ -27,7 +27,7 @@ std::vector<std::string> faults_of(const std::vector<double>& datum) {
   DatumParameters parameters;
   parameters.datum = datum;
   std::vector<std::string> faults;
-  parameters.check(faults);
+  faults = faults_of(parameters);
   return faults;
 }
 

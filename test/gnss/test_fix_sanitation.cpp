@@ -286,15 +286,15 @@ TEST(FixSanitation, EveryParameterHasAnEffectF36) {
 TEST(FixSanitation, ParametersMustBeInOrder) {
   std::vector<std::string> faults;
   FixSanitationParameters parameters;
-  parameters.check(faults);
+  faults = faults_of(parameters);
   EXPECT_TRUE(faults.empty());
   parameters.fix_sigma_default = 0.1;
-  parameters.check(faults);
+  faults = faults_of(parameters);
   ASSERT_EQ(faults.size(), 1u);
   EXPECT_NE(faults[0].find("fix_sigma_default"), std::string::npos);
   faults.clear();
   parameters.fix_sigma_floor = 300.0;
-  parameters.check(faults);
+  faults = faults_of(parameters);
   ASSERT_EQ(faults.size(), 1u);
   EXPECT_NE(faults[0].find("fix_sigma_floor"), std::string::npos);
 }

@@ -317,7 +317,7 @@ TEST(GnssCovariance, ProbabilitiesMustBeInOrder) {
   GnssCovarianceParameters p;
   p.nlos_if_free = 0.5;
   std::vector<std::string> faults;
-  p.check(faults);
+  faults = faults_of(p);
   ASSERT_EQ(faults.size(), 1u);
   EXPECT_NE(faults[0].find("nlos_if_free"), std::string::npos);
 }

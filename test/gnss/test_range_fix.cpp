@@ -6,6 +6,8 @@
 
 #include "range_rig.hpp"
 
+#include "urban_gnss_localization/parameters/parameter_reader.hpp"
+
 namespace urban_gnss {
 namespace {
 

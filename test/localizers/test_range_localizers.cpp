@@ -68,7 +68,8 @@ std::unique_ptr<Localizer> make_imm(const std::string& changes) {
   return std::make_unique<ImmEkf>(with(ImmEkfParameters{}, changes), MotionParameters{});
 }
 std::unique_ptr<Localizer> make_switching(const std::string& changes) {
-  return make_particle_filter(with(with(ParticleFilterParameters{}, "mode: switching"), changes), {});
+  return std::make_unique<SwitchingParticleFilter>(with(SwitchingParticleFilterParameters{}, changes),
+                                                   MotionParameters{});
 }
 
 /// Two YAML maps as one.

@@ -1,4 +1,5 @@
 #include "pipeline_rig.hpp"
+#include "urban_gnss_localization/localizers/nishida/particle_filter.hpp"
 #include "urban_gnss_localization/localizers/switching/imm_ekf.hpp"
 #include "urban_gnss_localization/localizers/switching/switching_particle_filter.hpp"
 
@@ -221,16 +222,28 @@ TEST(LocalizationPipeline, StampsAscendAcrossAResetThatIsAskedForF22) {
   EXPECT_EQ(rig.pipeline.take_outputs().size(), 1u);
 }
 
-TEST(LocalizationPipeline, ClockSetBackGivesTheSameRunAgainF21) {
-  for (const auto& [with_datum, mode] : {std::pair{false, ParticleFilterMode::kPaper},
-                                         {true, ParticleFilterMode::kPaper},
-                                         {true, ParticleFilterMode::kSwitching}}) {
+using MakeFilter = std::unique_ptr<Localizer> (*)(int particle_count);
+
+template <ParticleFilterMode kMode>
+std::unique_ptr<Localizer> make_filter(int particle_count) {
+  ParticleFilterParameters filter;
+  filter.mode = kMode;
+  filter.likelihood = LikelihoodChoice::kProduct;
+  filter.particle_count = particle_count;
+  return std::make_unique<ParticleFilter>(filter, MotionParameters{});
+}
+constexpr MakeFilter make_paper_filter = make_filter<ParticleFilterMode::kPaper>;
+constexpr MakeFilter make_conventional_filter = make_filter<ParticleFilterMode::kConventional>;
+constexpr MakeFilter make_switching_filter = [](int) -> std::unique_ptr<Localizer> {
+  return std::make_unique<SwitchingParticleFilter>(SwitchingParticleFilterParameters{}, MotionParameters{});
+};
+
+TEST(LocalizationPipeline, ClockSetBackGivesTheSameRunAgain) {
+  for (const auto& [with_datum, make] :
+       {std::pair{false, make_paper_filter}, {true, make_paper_filter}, {true, make_switching_filter}}) {
     LocalizationParameters parameters;
     if (with_datum) parameters.datum.datum = {33.0, 130.0, 20.0};
-    ParticleFilterParameters filter;
-    filter.mode = mode;
-    filter.particle_count = 100;
-    Rig rig(parameters, make_particle_filter(filter, MotionParameters{}));
+    Rig rig(parameters, make(100));
     std::vector<LocalizationOutput> passes[2];
     for (auto& pass : passes) {
       rig.run(0.0, 60.0);
@@ -250,13 +263,8 @@ TEST(LocalizationPipeline, ClockSetBackGivesTheSameRunAgainF21) {
 TEST(LocalizationPipeline, TracksWithTheParticleFilter) {
   LocalizationParameters parameters;
   parameters.datum.datum = {33.0, 130.0, 20.0};
-  for (const auto mode :
-       {ParticleFilterMode::kConventional, ParticleFilterMode::kPaper, ParticleFilterMode::kSwitching}) {
-    ParticleFilterParameters filter;
-    filter.mode = mode;
-    filter.likelihood = LikelihoodChoice::kProduct;
-    filter.particle_count = 500;
-    Rig rig(parameters, make_particle_filter(filter, MotionParameters{}));
+  for (const auto make : {make_conventional_filter, make_paper_filter, make_switching_filter}) {
+    Rig rig(parameters, make(500));
     rig.run(0.0, 120.0);
     const auto outputs = rig.pipeline.take_outputs();
     ASSERT_FALSE(outputs.empty());
@@ -369,13 +377,13 @@ TEST(LocalizationPipeline, EveryParameterHasAnEffectF36) {
 
 TEST(LocalizationPipeline, ParametersAreChecked) {
   std::vector<std::string> faults;
-  LocalizationParameters{}.check(faults);
+  faults = faults_of(LocalizationParameters{});
   EXPECT_TRUE(faults.empty());
   LocalizationParameters parameters;
   parameters.initial_pose = {1.0, 2.0};
   parameters.antenna_offset = {1.0};
   parameters.datum.datum = {1.0};
-  parameters.check(faults);
+  faults = faults_of(parameters);
   EXPECT_EQ(faults.size(), 3u);
 }
 

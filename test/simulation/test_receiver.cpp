@@ -204,12 +204,12 @@ TEST(Receiver, ResidualsOfAConstellationAverageToNothing) {
 TEST(Receiver, ParametersMustBeInOrder) {
   ReceiverParameters parameters;
   std::vector<std::string> faults;
-  parameters.check(faults);
+  faults = faults_of(parameters);
   EXPECT_TRUE(faults.empty());
   parameters.latency_min = 0.3;
   parameters.channel.tracking_threshold = 40.0;
   parameters.channel.cn0_horizon = 60.0;
-  parameters.check(faults);
+  faults = faults_of(parameters);
   EXPECT_EQ(faults.size(), 3u);
 }
 

@@ -13,9 +13,9 @@ namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
-ParticleFilterParameters switching(const std::string& changes = "{}") {
+SwitchingParticleFilterParameters switching(const std::string& changes = "{}") {
   return with(
-      with(with(ParticleFilterParameters{}, "{mode: switching, yaw_rate_scale_sigma: 0.0, common_error_sigma: 0.0}"),
+      with(with(SwitchingParticleFilterParameters{}, "{yaw_rate_scale_sigma: 0.0, common_error_sigma: 0.0}"),
            kTextbookNoise),
       changes);
 }
@@ -260,7 +260,7 @@ TEST(SwitchingParticleFilter, FixThatNoParticleExplainsDoesNotAbortF30) {
   EXPECT_TRUE(is_finite(filter.pose()));
 }
 
-TEST(SwitchingParticleFilter, EveryParameterHasAnEffectF36) {
+TEST(SwitchingParticleFilter, EveryParameterHasAnEffect) {
   const std::vector<std::pair<std::string, std::string>> changes = {
       {"max_particles: 3", "{}"},
       {"merge_distance: 5.0", "{}"},
@@ -301,14 +301,14 @@ TEST(SwitchingParticleFilter, EveryParameterHasAnEffectF36) {
       {"estimate: mean", kOftenBiased},
       {"cluster_cell: 20.0", kOftenBiased},
   };
-  // Those of the other modes, of a parked robot, of changing declarations, and of the covariance alone; elsewhere,
+  // Those of a parked robot, of changing declarations, and of the covariance alone; elsewhere,
   // those of ranges.
-  EXPECT_EQ(changes.size() + 14 + parameter_names(RangeFixParameters{}).size(),
-            parameter_names(ParticleFilterParameters{}).size());
+  EXPECT_EQ(changes.size() + 4 + parameter_names(RangeFixParameters{}).size(),
+            parameter_names(SwitchingParticleFilterParameters{}).size());
   SwitchingDrive d;
   d.bias = bias_between(10.0, 20.0, {4.0, 3.0});
   d.duration_s = 30.0;
-  const auto last = [&](const ParticleFilterParameters& p) {
+  const auto last = [&](const SwitchingParticleFilterParameters& p) {
     SwitchingParticleFilter filter(p, {});
     drive(filter, d);
     VelocityMeasurement velocity;
@@ -323,16 +323,8 @@ TEST(SwitchingParticleFilter, EveryParameterHasAnEffectF36) {
     return Pose2{x, filter.pose().x, filter.pose().y};
   };
   for (const auto& [change, base] : changes) {
-    const ParticleFilterParameters before = with(switching(), base);
+    const SwitchingParticleFilterParameters before = with(switching(), base);
     EXPECT_FALSE(last(with(before, change)) == last(before)) << change;
-  }
-}
-
-TEST(SwitchingParticleFilter, TheModeChoosesTheFilter) {
-  for (const char* mode : {"literal", "paper", "conventional", "switching"}) {
-    const auto filter = make_particle_filter(with(ParticleFilterParameters{}, std::string("mode: ") + mode), {});
-    EXPECT_EQ(filter->mode(), mode);
-    EXPECT_EQ(dynamic_cast<SwitchingParticleFilter*>(filter.get()) != nullptr, mode == std::string("switching"));
   }
 }
 

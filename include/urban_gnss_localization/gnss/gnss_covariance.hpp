@@ -37,48 +37,53 @@ const char* to_string(VisibilitySource source);
 
 struct GnssCovarianceParameters {
   CovarianceModel model{CovarianceModel::kSoft};
-  double sigma_ure{3.75};         ///< m, of a range in line of sight
-  double blocked_threshold{0.5};  ///< a satellite of which so large a share of rays is blocked is not visible
-  bool allow_smaller{false};      ///< than what the receiver claims
-  double assumed_hdop{1.2};       ///< where neither the receiver nor satellites tell
+  double sigma_ure{3.75};
+  double blocked_threshold{0.5};
+  bool allow_smaller{false};
+  double assumed_hdop{1.2};
   ReceiverWeighting receiver_weighting{ReceiverWeighting::kCn0};
-  double weight_cn0{40.0};              ///< dB-Hz, from here on the receiver weighs ranges equally
-  double weight_floor{0.01};            ///< least weight of a range, of 1
-  double nlos_mean{25.0};               ///< m, of the range error without line of sight
-  double nlos_sigma{25.0};              ///< m, about that mean
-  double nlos_hidden_exponent{0.0};     ///< both grow with this power of the hidden share of the satellites in view,
-  double nlos_elevation_exponent{0.0};  ///< and with this power of the cotangent of the elevation, 1 at 37 degrees
-  double nlos_cn0{28.0};                ///< dB-Hz, at which a signal at 37 degrees is as likely reflected as direct
-  double nlos_cn0_width{3.0};           ///< dB, that change the odds by e
-  double nlos_cn0_rise{-4.5};           ///< dB, by which nlos_cn0 rises from the horizon to the zenith
-  double nlos_if_blocked{0.9};          ///< probability of no line of sight where the map blocks it,
-  double nlos_if_free{0.005};           ///< where the map shows free space,
-  double nlos_if_unknown{0.1};          ///< and where it shows nothing
+  double weight_cn0{40.0};
+  double weight_floor{0.01};
+  double nlos_mean{25.0};
+  double nlos_sigma{25.0};
+  double nlos_hidden_exponent{0.0};
+  double nlos_elevation_exponent{0.0};
+  double nlos_cn0{28.0};
+  double nlos_cn0_width{3.0};
+  double nlos_cn0_rise{-4.5};
+  double nlos_if_blocked{0.9};
+  double nlos_if_free{0.005};
+  double nlos_if_unknown{0.1};
   ReceiverMemoryParameters memory;
   CovarianceFilterParameters filter;
 
-  template <class V>
-  void visit(V& v) {
-    v("model", model);
-    v("sigma_ure", sigma_ure, positive());
-    v("blocked_threshold", blocked_threshold, Range{0.0, 1.0, true});
-    v("allow_smaller", allow_smaller);
-    v("assumed_hdop", assumed_hdop, positive());
-    v("receiver_weighting", receiver_weighting);
-    v("weight_cn0", weight_cn0, between(0.0, 70.0));
-    v("weight_floor", weight_floor, between(1e-6, 1.0));
-    v("nlos_mean", nlos_mean, non_negative());
-    v("nlos_sigma", nlos_sigma, positive());
-    v("nlos_hidden_exponent", nlos_hidden_exponent, between(0.0, 5.0));
-    v("nlos_elevation_exponent", nlos_elevation_exponent, between(0.0, 5.0));
-    v("nlos_cn0", nlos_cn0, between(0.0, 70.0));
-    v("nlos_cn0_width", nlos_cn0_width, positive());
-    v("nlos_cn0_rise", nlos_cn0_rise, between(-30.0, 30.0));
-    v("nlos_if_blocked", nlos_if_blocked, between(0.001, 0.999));
-    v("nlos_if_free", nlos_if_free, between(0.001, 0.999));
-    v("nlos_if_unknown", nlos_if_unknown, between(0.001, 0.999));
-    memory.visit(v);
-    filter.visit(v);
+  void visit(ParameterVisitor& v) {
+    v.basic()("model", model, "soft, paper: eq. (6) and Algorithm 3, or conventional: eq. (4)");
+    v.basic()("sigma_ure", sigma_ure, positive(), "m", "standard deviation of a range in line of sight");
+    v("blocked_threshold", blocked_threshold, open_between(0.0, 1.0), "",
+      "paper: a satellite with so large a share of blocked rays is not visible");
+    v("allow_smaller", allow_smaller, "whether the result may be below the receiver's own covariance");
+    v("assumed_hdop", assumed_hdop, positive(), "", "where neither the receiver nor satellites tell");
+    v("receiver_weighting", receiver_weighting, "soft: how the receiver is taken to weigh its ranges, equal or cn0");
+    v("weight_cn0", weight_cn0, between(0.0, 70.0), "dB-Hz", "from here on it weighs ranges equally");
+    v("weight_floor", weight_floor, between(1e-6, 1.0), "", "its least weight of a range, of 1");
+    v("nlos_mean", nlos_mean, non_negative(), "m", "mean range error of a signal without line of sight");
+    v("nlos_sigma", nlos_sigma, positive(), "m", "standard deviation about that mean");
+    v("nlos_hidden_exponent", nlos_hidden_exponent, between(0.0, 5.0), "",
+      "both grow with this power of the share of the satellites in view that is hidden,");
+    v("nlos_elevation_exponent", nlos_elevation_exponent, between(0.0, 5.0), "",
+      "and with this power of the cotangent of the elevation, 1 at 37 degrees; 0: not");
+    v("nlos_cn0", nlos_cn0, between(0.0, 70.0), "dB-Hz",
+      "at which a signal at 37 degrees is as likely reflected as direct");
+    v("nlos_cn0_width", nlos_cn0_width, positive(), "dB", "that change the odds by e");
+    v("nlos_cn0_rise", nlos_cn0_rise, between(-30.0, 30.0), "dB",
+      "by which nlos_cn0 rises from the horizon to the zenith");
+    v("nlos_if_blocked", nlos_if_blocked, between(0.001, 0.999), "",
+      "probability of no line of sight where the map blocks it");
+    v("nlos_if_free", nlos_if_free, between(0.001, 0.999), "", "where the map shows free space");
+    v("nlos_if_unknown", nlos_if_unknown, between(0.001, 0.999), "", "where the map shows nothing");
+    v.include(memory);
+    v.include(filter);
   }
   void check(std::vector<std::string>& faults) const;
 };

@@ -15,35 +15,41 @@ namespace urban_gnss {
 
 /// What the ranges of a fix are worth, one by one.
 struct RangeFixParameters {
-  bool use_ranges{true};        ///< the ranges of a fix in place of the fix, where the receiver reports their residuals
-  double range_sigma{5.0};      ///< m, of a range in line of sight, before anything is learnt: noise, multipath, orbits
-  double range_sigma_min{0.6};  ///< m, the least that it can be learnt to be,
-  double range_sigma_max{8.0};  ///< m, and the most: larger errors are those of reflections
-  double reflected_range{18.0};  ///< m, mean by which a range is too long that is not in line of sight, at 37 degrees
-  double reflected_range_sigma{15.0};        ///< m, about that mean
-  double reflected_elevation_exponent{0.7};  ///< both grow with this power of 1 / sin(elevation)
-  double weak_cn0_drop{14.0};                ///< dB below a free signal at which one is as likely reflected as direct
-  double weak_cn0_width{2.5};                ///< dB, that change these odds by e
-  double antenna_cn0_rise{10.0};             ///< dB, of a free signal's C/N0 from the horizon to the zenith
-  double range_height_sigma{30.0};           ///< m, of the receiver's own height
-  double range_correlation_time{6.0};        ///< s, over which the error of ranges stays the same
-  double range_bias_odds{0.03};              ///< factor on the odds of a bias of a fix whose ranges are known
+  bool use_ranges{true};
+  double range_sigma{5.0};
+  double range_sigma_min{0.6};
+  double range_sigma_max{8.0};
+  double reflected_range{18.0};
+  double reflected_range_sigma{15.0};
+  double reflected_elevation_exponent{0.7};
+  double weak_cn0_drop{14.0};
+  double weak_cn0_width{2.5};
+  double antenna_cn0_rise{10.0};
+  double range_height_sigma{30.0};
+  double range_correlation_time{6.0};
+  double range_bias_odds{0.03};
 
-  template <class V>
-  void visit(V& v) {
-    v("use_ranges", use_ranges);
-    v("range_sigma", range_sigma, positive());
-    v("range_sigma_min", range_sigma_min, positive());
-    v("range_sigma_max", range_sigma_max, positive());
-    v("reflected_range", reflected_range, non_negative());
-    v("reflected_range_sigma", reflected_range_sigma, positive());
-    v("reflected_elevation_exponent", reflected_elevation_exponent, between(0.0, 5.0));
-    v("weak_cn0_drop", weak_cn0_drop, between(0.0, 50.0));
-    v("weak_cn0_width", weak_cn0_width, positive());
-    v("antenna_cn0_rise", antenna_cn0_rise, between(-30.0, 30.0));
-    v("range_height_sigma", range_height_sigma, positive());
-    v("range_correlation_time", range_correlation_time, non_negative());
-    v("range_bias_odds", range_bias_odds, positive());
+  void visit(ParameterVisitor& v) {
+    v("use_ranges", use_ranges, "the ranges of a fix in place of the fix, where gps/satellites has their residuals");
+    v("range_sigma", range_sigma, positive(), "m",
+      "of a range in line of sight, before anything is learnt: noise, multipath, orbits");
+    v("range_sigma_min", range_sigma_min, positive(), "m", "the least that it can be learnt to be");
+    v("range_sigma_max", range_sigma_max, positive(), "m", "and the most: larger errors are those of reflections");
+    v("reflected_range", reflected_range, non_negative(), "m",
+      "mean by which a range is too long that is not in line of sight, at 37 degrees");
+    v("reflected_range_sigma", reflected_range_sigma, positive(), "m", "about that mean");
+    v("reflected_elevation_exponent", reflected_elevation_exponent, between(0.0, 5.0), "",
+      "both grow with this power of 1 / sin(elevation)");
+    v("weak_cn0_drop", weak_cn0_drop, between(0.0, 50.0), "",
+      "dB below a free signal at which one is as likely reflected as direct");
+    v("weak_cn0_width", weak_cn0_width, positive(), "dB", "that change these odds by e");
+    v("antenna_cn0_rise", antenna_cn0_rise, between(-30.0, 30.0), "dB",
+      "of a free signal's C/N0 from the horizon to the zenith");
+    v("range_height_sigma", range_height_sigma, positive(), "m", "of the receiver's own height");
+    v("range_correlation_time", range_correlation_time, non_negative(), "s",
+      "over which the error of ranges stays the same; 0: independent errors");
+    v("range_bias_odds", range_bias_odds, positive(), "",
+      "factor on the odds of a bias of a fix whose ranges are known");
   }
   void check(std::vector<std::string>& faults) const {
     if (!(range_sigma_min <= range_sigma && range_sigma <= range_sigma_max)) {

@@ -11,15 +11,15 @@
 namespace urban_gnss {
 
 struct ReceiverMemoryParameters {
-  double receiver_smoothing_time{8.0};  ///< s, over which the receiver smooths its solutions; 0: not at all
-  double receiver_coasting_time{3.0};   ///< s without a solution after which it starts anew
+  double receiver_smoothing_time{8.0};
+  double receiver_coasting_time{3.0};
 
-  template <class V>
-  void visit(V& v) {
-    v("receiver_smoothing_time", receiver_smoothing_time, non_negative());
-    v("receiver_coasting_time", receiver_coasting_time, non_negative());
+  void visit(ParameterVisitor& v) {
+    v("receiver_smoothing_time", receiver_smoothing_time, non_negative(), "s",
+      "over which the receiver smooths: so long an error outlasts its cause");
+    v("receiver_coasting_time", receiver_coasting_time, non_negative(), "s",
+      "without a solution after which it starts anew");
   }
-  void check(std::vector<std::string>&) const {}
 };
 
 /// What is left in a receiver's fix of the errors before it; the soft form of the recovery in Algorithm 3 of Maier and

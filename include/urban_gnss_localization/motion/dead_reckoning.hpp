@@ -9,29 +9,29 @@ namespace urban_gnss {
 
 /// Noise of the odometry, and what is systematically wrong with it. Densities are standard deviations after one second.
 struct DeadReckoningParameters {
-  double odom_speed_noise{0.02};        ///< share of the speed, /sqrt(Hz): diagonal of Sigma_v
-  double odom_yaw_rate_noise{0.03};     ///< share of the yaw rate, /sqrt(Hz): diagonal of Sigma_v
-  double odom_position_noise{0.05};     ///< m/sqrt(s) per axis, while moving: Sigma_N
-  double odom_heading_noise{0.003};     ///< rad/sqrt(s), while moving: Sigma_N
-  bool estimate_odometry_errors{true};  ///< speed scale and yaw-rate bias as states; false: the paper's (x, y, heading)
-  double odom_scale_sigma{0.02};        ///< 1, of the speed scale's error at the start
-  double odom_scale_walk{2e-4};         ///< 1/sqrt(s), how fast it changes
-  double odom_yaw_bias_sigma{0.005};    ///< rad/s, of the yaw rate's bias at the start
-  double odom_yaw_bias_walk{3e-5};      ///< rad/s/sqrt(s), how fast it changes
+  double odom_speed_noise{0.02};
+  double odom_yaw_rate_noise{0.03};
+  double odom_position_noise{0.05};
+  double odom_heading_noise{0.003};
+  bool estimate_odometry_errors{true};
+  double odom_scale_sigma{0.02};
+  double odom_scale_walk{2e-4};
+  double odom_yaw_bias_sigma{0.005};
+  double odom_yaw_bias_walk{3e-5};
 
-  template <class V>
-  void visit(V& v) {
-    v("odom_speed_noise", odom_speed_noise, non_negative());
-    v("odom_yaw_rate_noise", odom_yaw_rate_noise, non_negative());
-    v("odom_position_noise", odom_position_noise, non_negative());
-    v("odom_heading_noise", odom_heading_noise, non_negative());
-    v("estimate_odometry_errors", estimate_odometry_errors);
-    v("odom_scale_sigma", odom_scale_sigma, non_negative());
-    v("odom_scale_walk", odom_scale_walk, non_negative());
-    v("odom_yaw_bias_sigma", odom_yaw_bias_sigma, non_negative());
-    v("odom_yaw_bias_walk", odom_yaw_bias_walk, non_negative());
+  void visit(ParameterVisitor& v) {
+    v("odom_speed_noise", odom_speed_noise, non_negative(), "", "share of the speed per sqrt(Hz), Sigma_v");
+    v("odom_yaw_rate_noise", odom_yaw_rate_noise, non_negative(), "", "share of the yaw rate per sqrt(Hz), Sigma_v");
+    v("odom_position_noise", odom_position_noise, non_negative(), "", "m/sqrt(s) per axis while moving, Sigma_N");
+    v("odom_heading_noise", odom_heading_noise, non_negative(), "", "rad/sqrt(s) while moving, Sigma_N");
+    v("estimate_odometry_errors", estimate_odometry_errors,
+      "speed scale and yaw-rate bias as states; false: the paper's (x, y, heading)");
+    v("odom_scale_sigma", odom_scale_sigma, non_negative(), "",
+      "share of the speed, of the scale's error at the start");
+    v("odom_scale_walk", odom_scale_walk, non_negative(), "", "share/sqrt(s), how fast it changes");
+    v("odom_yaw_bias_sigma", odom_yaw_bias_sigma, non_negative(), "rad/s", "of the yaw rate's bias at the start");
+    v("odom_yaw_bias_walk", odom_yaw_bias_walk, non_negative(), "rad/s/sqrt(s)", "how fast it changes");
   }
-  void check(std::vector<std::string>&) const {}
 };
 
 /// Order of the error states: x (m), y (m), yaw (rad), speed scale (1), yaw-rate bias (rad/s).

@@ -5,31 +5,33 @@
 #include <string>
 #include <vector>
 
-#include "urban_gnss_localization/localizers/nishida/bias_kalman_filter.hpp"
 #include "urban_gnss_localization/gnss/fix_sanitation.hpp"
+#include "urban_gnss_localization/localizers/nishida/bias_kalman_filter.hpp"
 #include "urban_gnss_localization/motion/odometry_history.hpp"
 #include "urban_gnss_localization/pipeline/stamp_monitor.hpp"
 
 namespace urban_gnss {
 
 struct BiasPipelineParameters {
-  std::vector<double> antenna_offset{0.0, 0.0};  ///< m, x and y of the antenna in the base frame
-  double estimate_timeout{0.2};  ///< s after a fix at which odometry alone carries the last estimate to it
-  double odometry_gap{2.0};      ///< s without odometry after which nothing is known of the bias any more
-  double time_jump{1.0};         ///< s, a stamp older by more than this is a clock that was set back
+  std::vector<double> antenna_offset{0.0, 0.0};
+  double estimate_timeout{0.2};
+  double odometry_gap{2.0};
+  double time_jump{1.0};
   bool reset_on_time_jump{true};
   FixSanitationParameters fix;
   GpsBiasParameters bias;
 
-  template <class V>
-  void visit(V& v) {
-    v("antenna_offset", antenna_offset);
-    v("estimate_timeout", estimate_timeout, non_negative());
-    v("odometry_gap", odometry_gap, positive());
-    v("time_jump", time_jump, positive());
-    v("reset_on_time_jump", reset_on_time_jump);
-    fix.visit(v);
-    bias.visit(v);
+  void visit(ParameterVisitor& v) {
+    v("antenna_offset", antenna_offset, "m", "x and y of the antenna in base_link_frame; the same as the localizer's");
+    v("estimate_timeout", estimate_timeout, non_negative(), "s",
+      "after a fix at which odometry alone carries the last estimate to it");
+    v("odometry_gap", odometry_gap, positive(), "s",
+      "without odometry after which nothing is known of the bias any more");
+    v("time_jump", time_jump, positive(), "s",
+      "a stamp older than the last by more than this is a clock that was set back");
+    v("reset_on_time_jump", reset_on_time_jump, "start anew where a clock was set back");
+    v.include(fix);
+    v.include(bias);
   }
   void check(std::vector<std::string>& faults) const;
 };

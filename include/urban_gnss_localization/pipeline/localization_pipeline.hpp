@@ -6,11 +6,11 @@
 #include <string>
 #include <vector>
 
-#include "urban_gnss_localization/localizers/nishida/bias_kalman_filter.hpp"
-#include "urban_gnss_localization/localizers/localizer.hpp"
 #include "urban_gnss_localization/gnss/datum_initializer.hpp"
 #include "urban_gnss_localization/gnss/fix_sanitation.hpp"
 #include "urban_gnss_localization/gnss/heading_initializer.hpp"
+#include "urban_gnss_localization/localizers/localizer.hpp"
+#include "urban_gnss_localization/localizers/nishida/bias_kalman_filter.hpp"
 #include "urban_gnss_localization/motion/odometry_history.hpp"
 #include "urban_gnss_localization/motion/yaw_rate_check.hpp"
 #include "urban_gnss_localization/pipeline/stamp_monitor.hpp"
@@ -18,51 +18,60 @@
 namespace urban_gnss {
 
 struct LocalizationParameters {
-  std::vector<double> initial_pose;              ///< m, m, rad in the map frame; empty: from fixes and motion
-  double initial_position_sigma{1.0};            ///< m, of initial_pose
-  double initial_heading_sigma{0.2};             ///< rad, of initial_pose
-  std::vector<double> antenna_offset{0.0, 0.0};  ///< m, x and y of the antenna in the base frame
-  bool use_imu_yaw_rate{true};                   ///< the IMU's yaw rate in place of the odometry's, where there is one
-  bool use_gps_velocity{true};                   ///< the receiver's velocity, where the localizer makes use of it
-  double velocity_sigma_default{0.3};  ///< m/s per axis, where a receiver declares no covariance of its velocity
-  double velocity_sigma_floor{0.05};   ///< m/s per axis, added to the declared covariance
-  double odometry_gap{2.0};            ///< s without odometry after which the robot's place is unknown
-  /// m, beyond three declared standard deviations: a fix farther from the estimate cannot be explained by reflections
-  /// (Nishida et al., Japanese text: the distance does not vary by more than some tens of metres)
+  std::vector<double> initial_pose;
+  double initial_position_sigma{1.0};
+  double initial_heading_sigma{0.2};
+  std::vector<double> antenna_offset{0.0, 0.0};
+  bool use_imu_yaw_rate{true};
+  bool use_gps_velocity{true};
+  double velocity_sigma_default{0.3};
+  double velocity_sigma_floor{0.05};
+  double odometry_gap{2.0};
   double max_bias_radius{50.0};
-  double lost_timeout{10.0};       ///< s of nothing but such fixes after which the estimate is what is wrong
-  double fix_timeout{10.0};        ///< s without a fix that was used after which this is dead reckoning
-  double bias_timeout{0.5};        ///< s that a fix waits for its gps/bias
-  double satellites_timeout{0.5};  ///< s that a fix waits for its gps/satellites, where those before it had some
-  double time_jump{1.0};           ///< s, a stamp older by more than this is a clock that was set back
+  double lost_timeout{10.0};
+  double fix_timeout{10.0};
+  double bias_timeout{0.5};
+  double satellites_timeout{0.5};
+  double time_jump{1.0};
   bool reset_on_time_jump{true};
-  double heading_converged_sigma{0.3};  ///< rad, heading is said to be known below this
+  double heading_converged_sigma{0.3};
   DatumParameters datum;
   FixSanitationParameters fix;
   HeadingInitializerParameters heading;
 
-  template <class V>
-  void visit(V& v) {
-    v("initial_pose", initial_pose);
-    v("initial_position_sigma", initial_position_sigma, non_negative());
-    v("initial_heading_sigma", initial_heading_sigma, non_negative());
-    v("antenna_offset", antenna_offset);
-    v("use_imu_yaw_rate", use_imu_yaw_rate);
-    v("use_gps_velocity", use_gps_velocity);
-    v("velocity_sigma_default", velocity_sigma_default, positive());
-    v("velocity_sigma_floor", velocity_sigma_floor, positive());
-    v("odometry_gap", odometry_gap, positive());
-    v("max_bias_radius", max_bias_radius, positive());
-    v("lost_timeout", lost_timeout, positive());
-    v("fix_timeout", fix_timeout, positive());
-    v("bias_timeout", bias_timeout, non_negative());
-    v("satellites_timeout", satellites_timeout, non_negative());
-    v("time_jump", time_jump, positive());
-    v("reset_on_time_jump", reset_on_time_jump);
-    v("heading_converged_sigma", heading_converged_sigma, positive());
-    datum.visit(v);
-    fix.visit(v);
-    heading.visit(v);
+  void visit(ParameterVisitor& v) {
+    v("initial_pose", initial_pose, "m", "m, rad: x, y, yaw in the map frame; empty: from fixes and motion");
+    v("initial_position_sigma", initial_position_sigma, non_negative(), "m",
+      "standard deviation of initial_pose per axis");
+    v("initial_heading_sigma", initial_heading_sigma, non_negative(), "rad",
+      "standard deviation of initial_pose's yaw");
+    v("antenna_offset", antenna_offset, "m", "x and y of the antenna in base_link_frame");
+    v("use_imu_yaw_rate", use_imu_yaw_rate,
+      "subscribe imu/data and, while it comes, use its yaw rate in place of the odometry's");
+    v("use_gps_velocity", use_gps_velocity, "subscribe gps/velocity, where the localizer makes use of it");
+    v("velocity_sigma_default", velocity_sigma_default, positive(), "m/s per axis",
+      "where a receiver declares no covariance of its velocity");
+    v("velocity_sigma_floor", velocity_sigma_floor, positive(), "m/s per axis",
+      "added to the declared covariance (as a variance)");
+    v("odometry_gap", odometry_gap, positive(), "s",
+      "without odometry after which the place is unknown and it starts anew");
+    v("max_bias_radius", max_bias_radius, positive(), "m",
+      "beyond 3 sigma: a fix farther from the estimate is no reflection's");
+    v("lost_timeout", lost_timeout, positive(), "s",
+      "of nothing but such fixes after which the estimate is what is wrong");
+    v("fix_timeout", fix_timeout, positive(), "s", "without a fix that was used after which this is dead reckoning");
+    v("bias_timeout", bias_timeout, non_negative(), "s", "that a fix waits for its gps/bias");
+    v("satellites_timeout", satellites_timeout, non_negative(), "s",
+      "that a fix waits for its gps/satellites, where those before it had some");
+    v("time_jump", time_jump, positive(), "s",
+      "a stamp older than the last by more than this is a clock that was set back");
+    v("reset_on_time_jump", reset_on_time_jump,
+      "start anew where a clock was set back, e.g. a bag that is played in a loop");
+    v("heading_converged_sigma", heading_converged_sigma, positive(), "rad",
+      "the heading is said to be known (~status, healthy) below this");
+    v.include(datum);
+    v.include(fix);
+    v.include(heading);
   }
   void check(std::vector<std::string>& faults) const;
 };

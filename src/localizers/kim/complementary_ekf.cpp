@@ -28,12 +28,6 @@ EnumNames<LockoutPolicy> enum_names(LockoutPolicy) {
   return {{"automatic", LockoutPolicy::kAutomatic}, {"dead_reckoning", LockoutPolicy::kDeadReckoning}};
 }
 
-void ComplementaryEkfParameters::check(std::vector<std::string>& faults) const {
-  detector.check(faults);
-  fix_noise.check(faults);
-  odometry.check(faults);
-}
-
 ComplementaryEkf::ComplementaryEkf(const ComplementaryEkfParameters& parameters)
     : parameters_(parameters),
       detector_(parameters.detector),

@@ -49,7 +49,7 @@ void slice_heading(const BiasGaussian& start, std::size_t most, std::vector<Bias
 
 }  // namespace
 
-SwitchingParticleFilter::SwitchingParticleFilter(const ParticleFilterParameters& parameters,
+SwitchingParticleFilter::SwitchingParticleFilter(const SwitchingParticleFilterParameters& parameters,
                                                  const MotionParameters& motion)
     : ParticleLocalizer(static_cast<std::size_t>(parameters.max_particles) + 1),
       parameters_(parameters),
@@ -69,7 +69,7 @@ SwitchingParticleFilter::SwitchingParticleFilter(const ParticleFilterParameters&
 
 void SwitchingParticleFilter::initialize(const PoseEstimate& start) {
   if (!is_finite(start.pose) || !start.covariance.allFinite()) {
-    throw std::invalid_argument("particle_filter: the pose to start from is not finite");
+    throw std::invalid_argument("switching_particle_filter: the pose to start from is not finite");
   }
   engine_ = make_engine(static_cast<std::uint64_t>(parameters_.seed));
   slice_heading(start_gaussian(start, parameters_.model), most_, hypotheses_);
@@ -288,14 +288,6 @@ ModeProbabilities SwitchingParticleFilter::mode_probabilities() const {
     probabilities[static_cast<int>(index_of(each.mode))] += each.weight;
   }
   return probabilities;
-}
-
-std::unique_ptr<ParticleLocalizer> make_particle_filter(const ParticleFilterParameters& parameters,
-                                                        const MotionParameters& motion) {
-  if (parameters.mode == ParticleFilterMode::kSwitching) {
-    return std::make_unique<SwitchingParticleFilter>(parameters, motion);
-  }
-  return std::make_unique<ParticleFilter>(parameters, motion);
 }
 
 }  // namespace urban_gnss

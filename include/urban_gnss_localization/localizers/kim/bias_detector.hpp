@@ -8,21 +8,23 @@
 namespace urban_gnss {
 
 struct BiasDetectorParameters {
-  double gate_probability{0.99};   ///< probability that an unbiased fix is taken for one
-  double ramp_slack{0.5};          ///< sigma per fix, a drift of the innovation below this is not summed (CUSUM)
-  double ramp_threshold{8.0};      ///< sigma, sum at which a drift is detected; with these, once in 7800 fixes falsely
-  int inert_window{30};            ///< count of fixes over which the NIS is summed for "gate inert"
-  double inert_probability{1e-4};  ///< probability that a working gate is called inert
+  double gate_probability{0.99};
+  double ramp_slack{0.5};
+  double ramp_threshold{8.0};
+  int inert_window{30};
+  double inert_probability{1e-4};
 
-  template <class V>
-  void visit(V& v) {
-    v("gate_probability", gate_probability, between(0.5, 0.999999));
-    v("ramp_slack", ramp_slack, non_negative());
-    v("ramp_threshold", ramp_threshold, positive());
-    v("inert_window", inert_window, between(1, 10000));
-    v("inert_probability", inert_probability, between(1e-9, 0.1));
+  void visit(ParameterVisitor& v) {
+    v("gate_probability", gate_probability, between(0.5, 0.999999), "",
+      "probability that an unbiased fix is taken for one, 2 DOF (paper: 0.95)");
+    v("ramp_slack", ramp_slack, non_negative(), "",
+      "sigma per fix, drift of the innovations that is not summed (CUSUM)");
+    v("ramp_threshold", ramp_threshold, positive(), "",
+      "sigma, sum at which they drift: with 0.5 above, falsely once in 7800 fixes");
+    v("inert_window", inert_window, between(1, 10000), "", "of fixes that the \"gate inert\" warning looks at");
+    v("inert_probability", inert_probability, between(1e-9, 0.1), "",
+      "probability that a gate that works is called inert");
   }
-  void check(std::vector<std::string>&) const {}
 };
 
 /// What the tests say of one innovation.

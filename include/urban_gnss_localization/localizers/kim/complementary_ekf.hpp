@@ -3,13 +3,13 @@
 #include <optional>
 #include <vector>
 
+#include "urban_gnss_localization/gnss/heading_initializer.hpp"
 #include "urban_gnss_localization/localizers/kim/bias_detector.hpp"
+#include "urban_gnss_localization/localizers/kim/fix_noise_monitor.hpp"
+#include "urban_gnss_localization/localizers/kim/two_stage_filter.hpp"
+#include "urban_gnss_localization/localizers/localizer.hpp"
 #include "urban_gnss_localization/localizers/nishida/bias_kalman_filter.hpp"
 #include "urban_gnss_localization/motion/dead_reckoning.hpp"
-#include "urban_gnss_localization/localizers/kim/fix_noise_monitor.hpp"
-#include "urban_gnss_localization/localizers/localizer.hpp"
-#include "urban_gnss_localization/localizers/kim/two_stage_filter.hpp"
-#include "urban_gnss_localization/gnss/heading_initializer.hpp"
 
 namespace urban_gnss {
 
@@ -29,44 +29,48 @@ EnumNames<LockoutPolicy> enum_names(LockoutPolicy);
 
 struct ComplementaryEkfParameters {
   ComplementaryMode mode{ComplementaryMode::kCompensated};
-  /// Standard and gated too take the noise as the fixes show it, and (gated) find ramps; false: the paper's
-  /// conventional filter (section 2.3), which believes what a fix declares.
   bool adapt_every_mode{true};
-  double fix_bias_sigma{20.0};     ///< m per axis, M0: the bias when its filter opens
-  double fix_bias_time{30.0};      ///< s, time after which a bias has faded; with fix_bias_sigma this gives Q_b
-  double close_probability{0.95};  ///< a bias inside this quantile is insignificant
-  int close_count{5};              ///< count of fixes in a row with an insignificant bias after which the filter closes
-  double detection_horizon{
-      10.0};  ///< s of odometry after which the tests' covariance grows no more while fixes are doubted
-  /// s, correlation time of a fix's error while the robot stands: reflections change little then (F34)
+  double fix_bias_sigma{20.0};
+  double fix_bias_time{30.0};
+  double close_probability{0.95};
+  int close_count{5};
+  double detection_horizon{10.0};
   double parked_correlation_time{150.0};
   LockoutPolicy lockout_policy{LockoutPolicy::kAutomatic};
-  double lockout_timeout{20.0};     ///< s of nothing but rejected fixes
-  double bias_open_timeout{120.0};  ///< s of an open bias filter
-  double lockout_gap{5.0};          ///< s without a fix that end such a run: what comes after a blackout counts anew
+  double lockout_timeout{20.0};
+  double bias_open_timeout{120.0};
+  double lockout_gap{5.0};
   BiasDetectorParameters detector;
   FixNoiseParameters fix_noise;
   DeadReckoningParameters odometry;
 
-  template <class V>
-  void visit(V& v) {
-    v("mode", mode);
-    v("adapt_every_mode", adapt_every_mode);
-    v("fix_bias_sigma", fix_bias_sigma, positive());
-    v("fix_bias_time", fix_bias_time, positive());
-    v("close_probability", close_probability, between(0.01, 0.999999));
-    v("close_count", close_count, between(1, 10000));
-    v("detection_horizon", detection_horizon, non_negative());
-    v("parked_correlation_time", parked_correlation_time, non_negative());
-    v("lockout_policy", lockout_policy);
-    v("lockout_timeout", lockout_timeout, positive());
-    v("bias_open_timeout", bias_open_timeout, positive());
-    v("lockout_gap", lockout_gap, positive());
-    detector.visit(v);
-    fix_noise.visit(v);
-    odometry.visit(v);
+  void visit(ParameterVisitor& v) {
+    v.basic()("mode", mode,
+              "standard: all fixes as they are; gated: biased ones rejected; compensated: the bias is estimated");
+    v("adapt_every_mode", adapt_every_mode,
+      "standard and gated too: noise as the fixes show, gated also finds ramps; false: the paper's conventional filter "
+      "(section 2.3), which believes the declared covariance");
+    v("fix_bias_sigma", fix_bias_sigma, positive(), "m per axis", "M0: the bias when the filter opens");
+    v("fix_bias_time", fix_bias_time, positive(), "s",
+      "after which a bias has faded; with fix_bias_sigma this gives the growth of M");
+    v("close_probability", close_probability, between(0.01, 0.999999), "",
+      "a bias inside this quantile is insignificant");
+    v("close_count", close_count, between(1, 10000), "",
+      "of fixes with an insignificant bias after which the filter closes");
+    v("detection_horizon", detection_horizon, non_negative(), "s",
+      "of doubted fixes after which the odometry's growing uncertainty widens no test");
+    v("parked_correlation_time", parked_correlation_time, non_negative(), "s",
+      "correlation time of a fix's error while the robot stands");
+    v("lockout_policy", lockout_policy,
+      "automatic: position anew on the fixes; dead_reckoning: until a fix agrees again");
+    v("lockout_timeout", lockout_timeout, positive(), "s", "of nothing but rejected fixes");
+    v("bias_open_timeout", bias_open_timeout, positive(), "s", "of an open bias filter");
+    v("lockout_gap", lockout_gap, positive(), "s",
+      "without a fix that end such a run: after a blackout it counts anew");
+    v.group("detector", detector, "When a fix is taken for biased.");
+    v.group("fix_noise", fix_noise, "The noise of the fixes, as they show it.");
+    v.group("odometry", odometry, "The odometry's noise and errors.");
   }
-  void check(std::vector<std::string>& faults) const;
 };
 
 /// The complementary filter of Kim et al. with compensation of the fix's bias (Fig. 4).

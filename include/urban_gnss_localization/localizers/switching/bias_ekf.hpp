@@ -7,12 +7,13 @@
 #include <string>
 #include <vector>
 
-#include "urban_gnss_localization/localizers/switching/bias_modes.hpp"
-#include "urban_gnss_localization/motion/dead_reckoning.hpp"
-#include "urban_gnss_localization/localizers/switching/fix_noise_model.hpp"
-#include "urban_gnss_localization/localizers/localizer.hpp"
-#include "urban_gnss_localization/localizers/switching/velocity_noise.hpp"
+#include "urban_gnss_localization/gnss/fix_sigma.hpp"
 #include "urban_gnss_localization/gnss/range_fix.hpp"
+#include "urban_gnss_localization/localizers/localizer.hpp"
+#include "urban_gnss_localization/localizers/switching/bias_modes.hpp"
+#include "urban_gnss_localization/localizers/switching/fix_noise_model.hpp"
+#include "urban_gnss_localization/localizers/switching/velocity_noise.hpp"
+#include "urban_gnss_localization/motion/dead_reckoning.hpp"
 
 namespace urban_gnss {
 
@@ -24,25 +25,26 @@ struct SwitchingModelParameters {
   VelocityNoiseParameters velocity;
   BiasModeParameters modes;
   OdometryErrorParameters odometry;
-  double yaw_rate_scale_sigma{0.005};  ///< standard deviation of the odometry's relative yaw-rate error, a constant
-  double fix_scale_lag{15.0};          ///< s apart at which fixes are compared with the odometry between them; 0: never
-  /// m per axis, of the error that fixes share for long (orbits, atmosphere), as far as they declare as much. No filter
-  /// sees it: it is added to the covariance of the estimate
+  double yaw_rate_scale_sigma{0.005};
+  double fix_scale_lag{15.0};
   double common_error_sigma{0.7};
 
-  template <class V>
-  void visit(V& v) {
-    fix.visit(v);
-    noise.visit(v);
-    ranges.visit(v);
-    velocity.visit(v);
-    modes.visit(v);
-    odometry.visit(v);
-    v("yaw_rate_scale_sigma", yaw_rate_scale_sigma, non_negative());
-    v("fix_scale_lag", fix_scale_lag, non_negative());
-    v("common_error_sigma", common_error_sigma, non_negative());
+  void visit(ParameterVisitor& v) {
+    v.include(fix);
+    v.group("noise", noise, "What the covariance is worth that a receiver declares.");
+    v.group("ranges", ranges,
+            "The ranges of a fix (gps/satellites): it is solved anew, each range in line of sight or reflected.");
+    v.group("velocity", velocity, "What the velocity of a receiver (gps/velocity) is worth.");
+    v.group("bias", modes,
+            "The bias of a fix: it is received directly, or has a bias that changes slowly, fast, or at once.");
+    v.group("odometry", odometry, "The odometry's own errors, which the filter estimates.");
+    v("yaw_rate_scale_sigma", yaw_rate_scale_sigma, non_negative(), "",
+      "standard deviation of the odometry's relative yaw-rate error, a constant");
+    v("fix_scale_lag", fix_scale_lag, non_negative(), "",
+      "s apart at which fixes are compared with the odometry between them; 0: never");
+    v("common_error_sigma", common_error_sigma, non_negative(), "m per axis",
+      "error that fixes share for long, as far as they declare as much");
   }
-  void check(std::vector<std::string>& faults) const { ranges.check(faults); }
 };
 
 /// Order of the states: pose and odometry errors (kErrorStates), relative error of the yaw rate (1), bias b_x, b_y (m).

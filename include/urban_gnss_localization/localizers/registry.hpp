@@ -1,0 +1,29 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "urban_gnss_localization/localizers/localizer_entry.hpp"
+
+namespace urban_gnss {
+
+/// The localizers that a program offers.
+class LocalizerRegistry {
+ public:
+  /// Requires names that differ.
+  explicit LocalizerRegistry(std::vector<LocalizerEntry> entries) : entries_(std::move(entries)) {}
+
+  const std::vector<LocalizerEntry>& entries() const { return entries_; }
+  /// Throws std::runtime_error, with all names, where there is none of this name.
+  const LocalizerEntry& find(const std::string& name) const;
+  /// "a, b or c", for people.
+  std::string names() const;
+
+ private:
+  std::vector<LocalizerEntry> entries_;
+};
+
+/// Those of this package, the recommended one first.
+LocalizerRegistry standard_localizers();
+
+}  // namespace urban_gnss
