@@ -122,7 +122,7 @@ class Replay {
     }
     while (const auto query = pipeline_.bias_query()) {
       const BiasEstimate& bias =
-          bias_tracker_.process(query->fix, query->predicted_antenna_position, query->sanitation);
+          bias_tracker_.process(query->fix, query->predicted_antenna_position, query->validation);
       write(topics::kBias, bias.stamp, to_message(bias, parameters_.node.frames.map));
       pipeline_.add_bias(bias);
     }

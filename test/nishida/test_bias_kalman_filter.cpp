@@ -218,7 +218,7 @@ TEST(BiasTracker, OneGoodFixStartsTheTimeoutAnew) {
   }
 }
 
-TEST(BiasTracker, SanitationsDecisionIsPassedOn) {
+TEST(BiasTracker, ValidationsDecisionIsPassedOn) {
   BiasTracker tracker({});
   FixVerdict inflated;
   inflated.decision = FixDecision::kInflated;

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "urban_gnss_localization/localizers/nishida/bias_kalman_filter.hpp"
-#include "urban_gnss_localization/gnss/fix_sanitation.hpp"
+#include "urban_gnss_localization/gnss/fix_validation.hpp"
 #include "urban_gnss_localization/motion/odometry_history.hpp"
 #include "urban_gnss_localization/pipeline/stamp_monitor.hpp"
 
@@ -18,7 +18,7 @@ struct BiasPipelineParameters {
   double odometry_gap{2.0};      ///< s without odometry after which nothing is known of the bias any more
   double time_jump{1.0};         ///< s, a stamp older by more than this is a clock that was set back
   bool reset_on_time_jump{true};
-  FixSanitationParameters fix;
+  FixValidationParameters fix;
   GpsBiasParameters bias;
 
   template <class V>
@@ -70,7 +70,7 @@ class BiasPipeline {
   StampMonitor estimate_stamps_;
   StampMonitor fix_stamps_;
   std::deque<std::pair<Stamp, Pose2>> poses_;
-  std::deque<SanitizedFix> pending_;
+  std::deque<ValidatedFix> pending_;
   std::optional<Stamp> last_fix_stamp_;
   std::vector<BiasEstimate> estimates_;
   std::vector<PipelineEvent> events_;

@@ -9,7 +9,7 @@
 #include "urban_gnss_localization/localizers/nishida/bias_kalman_filter.hpp"
 #include "urban_gnss_localization/localizers/localizer.hpp"
 #include "urban_gnss_localization/gnss/datum_initializer.hpp"
-#include "urban_gnss_localization/gnss/fix_sanitation.hpp"
+#include "urban_gnss_localization/gnss/fix_validation.hpp"
 #include "urban_gnss_localization/gnss/heading_initializer.hpp"
 #include "urban_gnss_localization/motion/odometry_history.hpp"
 #include "urban_gnss_localization/motion/yaw_rate_check.hpp"
@@ -38,7 +38,7 @@ struct LocalizationParameters {
   bool reset_on_time_jump{true};
   double heading_converged_sigma{0.3};  ///< rad, heading is said to be known below this
   DatumParameters datum;
-  FixSanitationParameters fix;
+  FixValidationParameters fix;
   HeadingInitializerParameters heading;
 
   template <class V>
@@ -111,11 +111,11 @@ struct LocalizationReport {
 /// A fix that waits for the bias at its stamp.
 struct BiasQuery {
   LocalFix fix;
-  FixVerdict sanitation;
+  FixVerdict validation;
   Eigen::Vector2d predicted_antenna_position{Eigen::Vector2d::Zero()};  ///< m, map frame, at the fix's stamp
 };
 
-/// Everything between the messages and the filter, the same for every localizer, live and offline: sanitation, datum,
+/// Everything between the messages and the filter, the same for every localizer, live and offline: validation, datum,
 /// start, odometry gaps, late fixes, fixes that wait for odometry or for their bias, clocks that are set back.
 ///
 /// It acts on stamps, not on times of arrival: what it does depends only on the order in which messages come. A fix
@@ -182,11 +182,11 @@ class LocalizationPipeline {
  private:
   struct PendingFix {
     LocalFix fix;
-    FixVerdict sanitation;
+    FixVerdict validation;
   };
 
   void use_datum(const GeodeticPosition& datum, const std::string& source);
-  void sanitize(const RawFix& fix);
+  void validate(const RawFix& fix);
   void process_velocities();
   void process_fixes();
   bool process_next_fix();

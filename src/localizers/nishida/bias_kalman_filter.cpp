@@ -86,7 +86,7 @@ void BiasTracker::start(const Eigen::Vector2d& measurement) {
 }
 
 const BiasEstimate& BiasTracker::process(const LocalFix& fix, const Eigen::Vector2d& predicted_antenna_position,
-                                         const FixVerdict& sanitation) {
+                                         const FixVerdict& validation) {
   const bool on_position = parameters_.bias_input == BiasInput::kPosition;
   const Eigen::Vector2d measurement =
       on_position ? fix.position : Eigen::Vector2d(fix.position - predicted_antenna_position);
@@ -102,7 +102,7 @@ const BiasEstimate& BiasTracker::process(const LocalFix& fix, const Eigen::Vecto
   estimate_.fix_position = fix.position;
   estimate_.predicted_antenna_position = predicted_antenna_position;
 
-  FixVerdict verdict = sanitation;
+  FixVerdict verdict = validation;
   verdict.stamp = fix.stamp;
   BiasKalmanFilter::Innovation innovation = filter_.innovation(measurement, noise);
   verdict.nis = innovation.nis();
@@ -133,9 +133,9 @@ const BiasEstimate& BiasTracker::process(const LocalFix& fix, const Eigen::Vecto
   estimate_.shadow_statistic = estimate_.bias.dot(estimate_.covariance.ldlt().solve(estimate_.bias));
   estimate_.in_shadow = estimate_.shadow_statistic > estimate_.shadow_threshold;
   verdict.decision = estimate_.in_shadow ? FixDecision::kBiasCompensated
-                     : is_rejected(sanitation.decision) || sanitation.decision == FixDecision::kNotExamined
+                     : is_rejected(validation.decision) || validation.decision == FixDecision::kNotExamined
                          ? FixDecision::kAccepted
-                         : sanitation.decision;
+                         : validation.decision;
   estimate_.verdict = verdict;
   return estimate_;
 }

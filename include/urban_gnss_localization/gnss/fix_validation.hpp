@@ -12,7 +12,7 @@
 namespace urban_gnss {
 
 /// What is believed of a receiver's own covariance, and how far from the datum a fix may lie.
-struct FixSanitationParameters {
+struct FixValidationParameters {
   /// m, standard deviation per horizontal axis where a fix declares no covariance that can be used
   double fix_sigma_default{4.0};
   /// m, smallest standard deviation that is believed; receivers declare millimetres, or degrees squared
@@ -35,13 +35,13 @@ struct FixSanitationParameters {
   void check(std::vector<std::string>& faults) const;
 };
 
-/// A fix after sanitation. Where is_rejected(verdict.decision), `fix` holds nothing but the stamp.
-struct SanitizedFix {
+/// A fix after validation. Where is_rejected(verdict.decision), `fix` holds nothing but the stamp.
+struct ValidatedFix {
   LocalFix fix;
   FixVerdict verdict;
 };
 
-/// The part of sanitation that needs neither datum nor history: in this order, the receiver has a fix (else
+/// The part of validation that needs neither datum nor history: in this order, the receiver has a fix (else
 /// kRejectedStatus); latitude and longitude are finite (else kRejectedNonFinite); the stamp is not negative, they name
 /// a place, and are not both exactly 0, which is what receivers report before they know (else kRejectedOutOfRange).
 bool is_usable_position(const RawFix& raw);
@@ -60,7 +60,7 @@ bool is_usable_position(const RawFix& raw);
 /// was used, else kAccepted; verdict.covariance_clamped tells of all three.
 ///
 /// `last_stamp` is the stamp of the fix handled last, nothing at the start. Requires parameters without faults.
-SanitizedFix sanitize_fix(const RawFix& raw, const LocalFrame& frame, std::optional<Stamp> last_stamp,
-                          const FixSanitationParameters& parameters);
+ValidatedFix validate_fix(const RawFix& raw, const LocalFrame& frame, std::optional<Stamp> last_stamp,
+                          const FixValidationParameters& parameters);
 
 }  // namespace urban_gnss
