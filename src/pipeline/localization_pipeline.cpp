@@ -6,7 +6,6 @@
 
 #include "limits.hpp"
 #include "text.hpp"
-#include "urban_gnss_localization/localizers/maier/unscented.hpp"
 
 namespace urban_gnss {
 

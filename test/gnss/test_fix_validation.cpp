@@ -74,7 +74,7 @@ TEST(FixValidation, NoFixIsRejectedByStatusBeforeAnythingElse) {
   EXPECT_FALSE(is_usable_position(raw));
 }
 
-TEST(FixValidation, NonFiniteCoordinatesAreRejectedF25) {
+TEST(FixValidation, NonFiniteCoordinatesAreRejected) {
   for (const double value : {kNaN, kInfinity, -kInfinity}) {
     EXPECT_EQ(decision_at(value, 130.84), FixDecision::kRejectedNonFinite);
     EXPECT_EQ(decision_at(33.89, value), FixDecision::kRejectedNonFinite);
@@ -92,7 +92,7 @@ TEST(FixValidation, NoSuchPlaceIsRejected) {
   EXPECT_EQ(validate(raw).verdict.decision, FixDecision::kRejectedOutOfRange);
 }
 
-TEST(FixValidation, LatitudeAndLongitudeBothZeroAreRejectedF15) {
+TEST(FixValidation, LatitudeAndLongitudeBothZeroAreRejected) {
   FixValidationParameters parameters;
   RawFix raw = good_fix();
   raw.position = {0.0, -0.0, 10.0};
@@ -153,7 +153,7 @@ TEST(FixValidation, StampMustBeNewerThanTheLast) {
   EXPECT_EQ(validate(raw, {}, raw.stamp - Stamp(1)).verdict.decision, FixDecision::kAccepted);
 }
 
-TEST(FixValidation, UnusableAltitudeDoesNotDropTheFixF15) {
+TEST(FixValidation, UnusableAltitudeDoesNotDropTheFix) {
   RawFix raw = good_fix();
   raw.position.altitude_m = kDatum.altitude_m;
   const Eigen::Vector2d expected = validate(raw).fix.position;
@@ -177,7 +177,7 @@ TEST(FixValidation, RejectedFixHoldsNothingButTheStamp) {
   EXPECT_TRUE(is_rejected(result.verdict.decision));
 }
 
-TEST(FixValidation, CovarianceThatCannotBeUsedIsTheDefaultF12) {
+TEST(FixValidation, CovarianceThatCannotBeUsedIsTheDefault) {
   FixValidationParameters parameters;
   parameters.fix_sigma_default = 7.0;
   RawFix unknown = good_fix();
@@ -209,7 +209,7 @@ TEST(FixValidation, VerticalCovarianceDoesNotMatter) {
   EXPECT_EQ(validate(raw).verdict.decision, FixDecision::kAccepted);
 }
 
-TEST(FixValidation, MillimetresAndSquaredDegreesAreRaisedToTheFloorF12) {
+TEST(FixValidation, MillimetresAndSquaredDegreesAreRaisedToTheFloor) {
   for (const double variance : {9e-6, 1e-10, 1e-300, std::numeric_limits<double>::denorm_min()}) {
     const auto result = validate(fix_with_covariance(variance, variance, 0.0));
     EXPECT_EQ(result.verdict.decision, FixDecision::kInflated);
@@ -219,7 +219,7 @@ TEST(FixValidation, MillimetresAndSquaredDegreesAreRaisedToTheFloorF12) {
   }
 }
 
-TEST(FixValidation, HugeVariancesAreLoweredToTheCeilingF12) {
+TEST(FixValidation, HugeVariancesAreLoweredToTheCeiling) {
   for (const double variance : {4.1e4, 1e10, 1e200, kMax}) {
     const auto result = validate(fix_with_covariance(variance, variance, 0.0));
     EXPECT_EQ(result.verdict.decision, FixDecision::kAccepted) << result.verdict.reason;
@@ -240,7 +240,7 @@ TEST(FixValidation, AxesAreClampedEachOnItsOwn) {
   EXPECT_NEAR(both.fix.covariance(1, 1), 0.09, 1e-9);
 }
 
-TEST(FixValidation, CorrelationIsKeptF13) {
+TEST(FixValidation, CorrelationIsKept) {
   // A street canyon at 30 degrees: 20 m across, 0.1 m along.
   const Eigen::Matrix2d rotation = Eigen::Rotation2Dd(M_PI / 6.0).toRotationMatrix();
   const auto ellipse = [&](double along, double across) -> Eigen::Matrix2d {
@@ -271,7 +271,7 @@ TEST(FixValidation, OffDiagonalsAreNotReadWhereOnlyTheDiagonalIsKnown) {
   EXPECT_TRUE(is_near(validate(raw).fix.covariance, Eigen::Vector2d(4.0, 9.0).asDiagonal()));
 }
 
-TEST(FixValidation, EveryParameterHasAnEffectF36) {
+TEST(FixValidation, EveryParameterHasAnEffect) {
   FixValidationParameters parameters;
   parameters.fix_covariance_scale = 4.0;
   EXPECT_TRUE(is_near(validate(good_fix(), parameters).fix.covariance, Eigen::Vector2d(16.0, 36.0).asDiagonal()));
@@ -299,7 +299,7 @@ TEST(FixValidation, ParametersMustBeInOrder) {
   EXPECT_NE(faults[0].find("fix_sigma_floor"), std::string::npos);
 }
 
-TEST(FixValidation, NothingReceivedLeadsToANonFiniteResultF25) {
+TEST(FixValidation, NothingReceivedLeadsToANonFiniteResult) {
   const double nasty[] = {0.0,
                           -0.0,
                           1.0,

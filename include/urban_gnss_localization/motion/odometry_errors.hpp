@@ -30,9 +30,6 @@ struct OdometryErrorParameters {
   void check(std::vector<std::string>&) const {}
 };
 
-/// Whether the robot stands; what is left of the yaw rate is then a gyroscope's error.
-bool is_parked(const Twist2& twist);
-
 /// The motion model's step with the noise that is left where the odometry's errors are states.
 MotionStep make_motion_step(const Twist2& twist, double duration_s, const MotionParameters& motion,
                             const OdometryErrorParameters& errors);

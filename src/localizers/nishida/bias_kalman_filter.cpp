@@ -8,8 +8,6 @@
 namespace urban_gnss {
 namespace {
 
-constexpr int kFixDof = 2;
-
 Eigen::Matrix<double, 2, 4> observation() {
   Eigen::Matrix<double, 2, 4> c = Eigen::Matrix<double, 2, 4>::Zero();
   c(0, 0) = 1.0;

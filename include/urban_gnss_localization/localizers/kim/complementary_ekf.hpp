@@ -3,13 +3,14 @@
 #include <optional>
 #include <vector>
 
+#include "urban_gnss_localization/gnss/heading_initializer.hpp"
 #include "urban_gnss_localization/localizers/kim/bias_detector.hpp"
+#include "urban_gnss_localization/localizers/kim/fix_noise_monitor.hpp"
+#include "urban_gnss_localization/localizers/kim/two_stage_filter.hpp"
+#include "urban_gnss_localization/localizers/localizer.hpp"
 #include "urban_gnss_localization/localizers/nishida/bias_kalman_filter.hpp"
 #include "urban_gnss_localization/motion/dead_reckoning.hpp"
-#include "urban_gnss_localization/localizers/kim/fix_noise_monitor.hpp"
-#include "urban_gnss_localization/localizers/localizer.hpp"
-#include "urban_gnss_localization/localizers/kim/two_stage_filter.hpp"
-#include "urban_gnss_localization/gnss/heading_initializer.hpp"
+#include "urban_gnss_localization/motion/standstill.hpp"
 
 namespace urban_gnss {
 
@@ -20,12 +21,15 @@ enum class ComplementaryMode {
 };
 EnumNames<ComplementaryMode> enum_names(ComplementaryMode);
 
-/// What happens when the fixes contradict the estimate for long (F3).
+/// What happens when the fixes contradict the estimate for long.
 enum class LockoutPolicy {
   kAutomatic,      ///< after lockout_timeout the estimate is what is wrong: its position starts anew on the fixes
   kDeadReckoning,  ///< the odometry is believed until a fix agrees with it again, or a pose is set
 };
 EnumNames<LockoutPolicy> enum_names(LockoutPolicy);
+
+/// The Sigma_v of Kim et al.: 0.02 of the speed and 0.03 of the yaw rate, per sqrt(Hz).
+MotionParameters kim_motion();
 
 struct ComplementaryEkfParameters {
   ComplementaryMode mode{ComplementaryMode::kCompensated};
@@ -38,15 +42,17 @@ struct ComplementaryEkfParameters {
   int close_count{5};              ///< count of fixes in a row with an insignificant bias after which the filter closes
   double detection_horizon{
       10.0};  ///< s of odometry after which the tests' covariance grows no more while fixes are doubted
-  /// s, correlation time of a fix's error while the robot stands: reflections change little then (F34)
+  /// s, correlation time of a fix's error while the robot stands: reflections change little then
   double parked_correlation_time{150.0};
   LockoutPolicy lockout_policy{LockoutPolicy::kAutomatic};
   double lockout_timeout{20.0};     ///< s of nothing but rejected fixes
   double bias_open_timeout{120.0};  ///< s of an open bias filter
   double lockout_gap{5.0};          ///< s without a fix that end such a run: what comes after a blackout counts anew
+  bool estimate_odometry_errors{true};  ///< speed scale and yaw-rate bias as states; false: the paper's (x, y, heading)
   BiasDetectorParameters detector;
   FixNoiseParameters fix_noise;
-  DeadReckoningParameters odometry;
+  OdometryErrorParameters odometry{1.0, 0.02, 2e-4, 0.005, 3e-5, 0.05, 0.003, 0.0};
+  MotionParameters motion = kim_motion();
 
   template <class V>
   void visit(V& v) {
@@ -62,9 +68,11 @@ struct ComplementaryEkfParameters {
     v("lockout_timeout", lockout_timeout, positive());
     v("bias_open_timeout", bias_open_timeout, positive());
     v("lockout_gap", lockout_gap, positive());
+    v("estimate_odometry_errors", estimate_odometry_errors);
     detector.visit(v);
     fix_noise.visit(v);
     odometry.visit(v);
+    motion.visit(v);
   }
   void check(std::vector<std::string>& faults) const;
 };
@@ -110,7 +118,7 @@ class ComplementaryEkf : public Localizer {
   bool is_bias_open() const { return is_open_; }
   Eigen::Vector2d bias() const { return filter_.bias(); }
   Eigen::Matrix2d bias_covariance() const { return filter_.bias_covariance(); }
-  /// Whether the gate cannot find anything, as the NIS runs far below its expectation (F4).
+  /// Whether the gate cannot find anything, as the NIS runs far below its expectation.
   bool is_gate_inert() const { return is_inert_; }
   /// smallest_detectable_jump (m) at the last fix; 0 before the first.
   double smallest_detectable_jump_m() const;
@@ -185,8 +193,7 @@ class ComplementaryEkf : public Localizer {
   bool is_inert_{false};
   std::optional<Run> run_;
   std::optional<HeadingInitializer> heading_search_;  ///< while the heading is unknown
-  double moved_since_fix_m_{0.0};
-  double elapsed_since_fix_s_{0.0};  ///< of odometry
+  Travel since_fix_;                                  ///< of odometry
   Eigen::Matrix2d last_test_covariance_{Eigen::Matrix2d::Zero()};
   std::vector<BiasEstimate> bias_estimates_;
 };

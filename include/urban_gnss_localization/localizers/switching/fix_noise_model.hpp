@@ -7,7 +7,7 @@
 
 #include "urban_gnss_localization/common/parameters.hpp"
 #include "urban_gnss_localization/localizers/switching/learnt_scale.hpp"
-#include "urban_gnss_localization/motion/motion_model.hpp"
+#include "urban_gnss_localization/motion/standstill.hpp"
 
 namespace urban_gnss {
 
@@ -19,7 +19,7 @@ struct FixNoiseModelParameters {
   double fix_covariance_weight{0.5};     ///< 0 to 1, how far the declared covariance's ups and downs are believed
   double fix_scale_limit{15.0};          ///< factor by which declared standard deviations may be wrong, either way
   double fix_correlation_time{3.0};      ///< s, over which the error of a fix stays the same; 0: independent errors
-  double parked_correlation_time{30.0};  ///< s, the same while the robot stands: reflections change little then (F34)
+  double parked_correlation_time{30.0};  ///< s, the same while the robot stands: reflections change little then
 
   template <class V>
   void visit(V& v) {
@@ -65,7 +65,7 @@ class FixNoiseModel {
   /// The next fix declares `declared` (m^2, positive definite): as far as its ups and downs are believed. Its size is
   /// drawn towards the geometric mean of those declared lately, by the power 1 - fix_covariance_weight, at most by a
   /// factor of 4.
-  Eigen::Matrix2d believed(const Eigen::Matrix2d& declared);
+  Eigen::Matrix2d effective_covariance(const Eigen::Matrix2d& declared);
   /// Factor on the covariance of a fix at `time_s` by which correlation lowers its worth, at least 1.
   double correlation_inflation(double time_s) const;
 
@@ -89,8 +89,7 @@ class FixNoiseModel {
   std::optional<LearntScale> lagged_scale_;
   std::deque<DeadReckonedFix> fixes_;
   std::optional<double> last_s_;
-  double moved_m_{0.0};
-  double elapsed_s_{0.0};
+  Travel since_fix_;
 };
 
 }  // namespace urban_gnss
