@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "urban_gnss_localization/experiments/city_drive.hpp"
+#include "urban_gnss_localization/geometry/isometry.hpp"
 #include "urban_gnss_localization/geometry/local_frame.hpp"
 
 namespace urban_gnss {
@@ -76,7 +77,7 @@ class Participant : public DriveParticipant {
       bias_tracker_.reset();
     }
     while (const auto query = localization_.bias_query()) {
-      localization_.add_bias(bias_tracker_.process(query->fix, query->predicted_antenna_position, query->sanitation));
+      localization_.add_bias(bias_tracker_.process(query->fix, query->predicted_antenna_position, query->validation));
     }
     for (const LocalizationOutput& output : localization_.take_outputs()) {
       estimate_.push_back({output.stamp, output.estimate.pose, output.estimate.covariance});

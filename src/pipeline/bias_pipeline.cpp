@@ -69,8 +69,8 @@ void BiasPipeline::add_estimate(Stamp stamp, const Pose2& pose) {
 void BiasPipeline::add_fix(const RawFix& fix) {
   if (!frame_) return;
   // A receiver that does not know where it is may not know the time either.
-  if (is_usable_position(fix)) is_new(fix_stamps_, fix.stamp, "fixes");  // sanitation judges the rest
-  SanitizedFix sane = sanitize_fix(fix, *frame_, last_fix_stamp_, parameters_.fix);
+  if (is_usable_position(fix)) is_new(fix_stamps_, fix.stamp, "fixes");  // validation judges the rest
+  ValidatedFix sane = validate_fix(fix, *frame_, last_fix_stamp_, parameters_.fix);
   if (is_rejected(sane.verdict.decision)) {
     reject(sane.verdict);
     return;
@@ -103,7 +103,7 @@ std::optional<Pose2> BiasPipeline::pose_at(Stamp stamp) const {
 
 bool BiasPipeline::process_next_fix() {
   if (pending_.empty() || poses_.empty()) return false;
-  const SanitizedFix& next = pending_.front();
+  const ValidatedFix& next = pending_.front();
   const Stamp stamp = next.fix.stamp;
   const bool has_estimate = poses_.back().first >= stamp;
   const bool has_waited = !history_.empty() && to_seconds(history_.latest() - stamp) >= parameters_.estimate_timeout;

@@ -4,7 +4,7 @@
 
 #include "limits.hpp"
 #include "text.hpp"
-#include "urban_gnss_localization/localizers/maier/unscented.hpp"
+#include "urban_gnss_localization/common/positive_definite.hpp"
 #include "urban_gnss_localization/pipeline/localization_pipeline.hpp"
 
 namespace urban_gnss {

@@ -6,7 +6,6 @@
 
 #include "limits.hpp"
 #include "text.hpp"
-#include "urban_gnss_localization/localizers/maier/unscented.hpp"
 
 namespace urban_gnss {
 
@@ -138,7 +137,7 @@ void LocalizationPipeline::add_fix(const RawFix& fix) {
     return;
   }
   // A receiver that does not know where it is may not know the time either.
-  if (is_usable_position(fix)) is_new(fix_stamps_, fix.stamp, "fixes");  // sanitation judges the rest
+  if (is_usable_position(fix)) is_new(fix_stamps_, fix.stamp, "fixes");  // validation judges the rest
   if (!frame_) {
     before_datum_.push_back(fix);
     if (before_datum_.size() > kMaxWaitingFixes) before_datum_.pop_front();
@@ -147,12 +146,12 @@ void LocalizationPipeline::add_fix(const RawFix& fix) {
     }
     return;
   }
-  sanitize(fix);
+  validate(fix);
   process_fixes();
 }
 
-void LocalizationPipeline::sanitize(const RawFix& fix) {
-  SanitizedFix sane = sanitize_fix(fix, *frame_, last_fix_stamp_, parameters_.fix);
+void LocalizationPipeline::validate(const RawFix& fix) {
+  ValidatedFix sane = validate_fix(fix, *frame_, last_fix_stamp_, parameters_.fix);
   if (is_rejected(sane.verdict.decision)) {
     decide(std::move(sane.verdict));
     return;
@@ -195,7 +194,7 @@ std::optional<BiasQuery> LocalizationPipeline::bias_query() const {
   const PendingFix& next = pending_.front();
   const auto predicted = predicted_antenna(next.fix.stamp);
   if (!predicted) return std::nullopt;
-  return BiasQuery{next.fix, next.sanitation, *predicted};
+  return BiasQuery{next.fix, next.validation, *predicted};
 }
 
 std::optional<Eigen::Vector2d> LocalizationPipeline::predicted_antenna(Stamp stamp) const {
@@ -219,7 +218,7 @@ bool LocalizationPipeline::process_next_fix() {
   if (next.fix.stamp > history_.latest()) return false;
   if (next.fix.stamp < history_.oldest()) {
     pending_.pop_front();
-    FixVerdict verdict = next.sanitation;
+    FixVerdict verdict = next.validation;
     verdict.decision = FixDecision::kRejectedStale;
     verdict.reason = "older than the odometry that is remembered";
     decide(std::move(verdict));
@@ -272,15 +271,15 @@ void LocalizationPipeline::correct_with(const PendingFix& pending, double radius
   measurement.satellites = take_satellites_of(pending.fix.stamp);
   FixVerdict verdict = localizer_->correct(measurement);
   verdict.stamp = pending.fix.stamp;
-  verdict.covariance_clamped = pending.sanitation.covariance_clamped;
-  if (verdict.decision == FixDecision::kAccepted) verdict.decision = pending.sanitation.decision;
-  if (verdict.reason.empty()) verdict.reason = pending.sanitation.reason;
+  verdict.covariance_clamped = pending.validation.covariance_clamped;
+  if (verdict.decision == FixDecision::kAccepted) verdict.decision = pending.validation.decision;
+  if (verdict.reason.empty()) verdict.reason = pending.validation.reason;
   decide(std::move(verdict));
   guard_against_non_finite();
 }
 
 void LocalizationPipeline::decide_unexamined(const PendingFix& pending, const char* reason) {
-  FixVerdict verdict = pending.sanitation;
+  FixVerdict verdict = pending.validation;
   verdict.decision = FixDecision::kNotExamined;
   verdict.reason = reason;
   last_verdict_ = verdict;

@@ -26,7 +26,7 @@ void LocalizationPipeline::use_datum(const GeodeticPosition& datum, const std::s
        << ", altitude " << datum.altitude_m << " m";
   event(PipelineEvent::Level::kInfo, text.str());
   const std::deque<RawFix> waiting = std::exchange(before_datum_, {});
-  for (const RawFix& fix : waiting) sanitize(fix);
+  for (const RawFix& fix : waiting) validate(fix);
   process_fixes();
 }
 

@@ -20,9 +20,9 @@
 #include "urban_gnss_localization/evaluation/report_json.hpp"
 #include "urban_gnss_localization/evaluation/tum.hpp"
 #include "urban_gnss_localization/localizers/kim/complementary_ekf.hpp"
+#include "urban_gnss_localization/localizers/maier/ukf.hpp"
 #include "urban_gnss_localization/localizers/switching/imm_ekf.hpp"
 #include "urban_gnss_localization/localizers/switching/switching_particle_filter.hpp"
-#include "urban_gnss_localization/localizers/maier/ukf.hpp"
 #include "urban_gnss_localization/ros/conversions.hpp"
 #include "urban_gnss_localization/ros/topics.hpp"
 #include "urban_gnss_localization/ros/visibility_messages.hpp"
@@ -122,7 +122,7 @@ class Replay {
     }
     while (const auto query = pipeline_.bias_query()) {
       const BiasEstimate& bias =
-          bias_tracker_.process(query->fix, query->predicted_antenna_position, query->sanitation);
+          bias_tracker_.process(query->fix, query->predicted_antenna_position, query->validation);
       write(topics::kBias, bias.stamp, to_message(bias, parameters_.node.frames.map));
       pipeline_.add_bias(bias);
     }

@@ -168,7 +168,7 @@ TEST(CovarianceFilter, ResetForgetsTheRun) {
   EXPECT_TRUE(filter.add(with_sigma(2.0)).is_good);
 }
 
-TEST(CovarianceFilter, EveryParameterHasAnEffectF36) {
+TEST(CovarianceFilter, EveryParameterHasAnEffect) {
   const std::vector<double> sigmas{2, 5, 2, 8, 8, 2, 2, 10, 10, 10, 10, 10, 10, 2, 2, 2, 2, 2};
   const auto outcome = [&](const CovarianceFilterParameters& p) {
     std::vector<double> values;

@@ -32,7 +32,7 @@ TEST(LocalizationPipeline, LateFixIsComparedWithThePoseAtItsOwnStampF23) {
     const FixMeasurement& fix = rig.fake->fixes.back();
     EXPECT_NEAR(fix.time_s, 1000.0 + time, 1e-9);
     EXPECT_LT((transform_point(Rig::truth(4.0), fix.antenna_in_body) - fix.position).norm(), 1e-6) << time;
-    const Pose2 back = between(Rig::truth(4.0), Rig::truth(time));
+    const Pose2 back = relative_pose(Rig::truth(4.0), Rig::truth(time));
     EXPECT_LT((fix.antenna_in_body - transform_point(back, {0.4, -0.3})).norm(), 1e-12) << time;
   }
 }

@@ -14,10 +14,9 @@ namespace {
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 SwitchingParticleFilterParameters switching(const std::string& changes = "{}") {
-  return with(
-      with(with(SwitchingParticleFilterParameters{}, "{yaw_rate_scale_sigma: 0.0, common_error_sigma: 0.0}"),
-           kTextbookNoise),
-      changes);
+  return with(with(with(SwitchingParticleFilterParameters{}, "{yaw_rate_scale_sigma: 0.0, common_error_sigma: 0.0}"),
+                   kTextbookNoise),
+              changes);
 }
 SwitchingParticleFilter make(const std::string& changes = "{}") { return {switching(changes), {}}; }
 
@@ -119,7 +118,7 @@ void see_two_places(SwitchingParticleFilter& filter) {
 }
 const char* const kOftenBiased = "{direct_time: 2.0, bias_end_time: 2.0, onset_sigma: 0.1}";
 
-TEST(SwitchingParticleFilter, EstimateIsOfTheHeaviestClusterF32) {
+TEST(SwitchingParticleFilter, EstimateIsOfTheHeaviestCluster) {
   SwitchingParticleFilter filter = make(kOftenBiased);
   see_two_places(filter);
   const LocalizerHealth health = filter.health();
@@ -133,7 +132,7 @@ TEST(SwitchingParticleFilter, EstimateIsOfTheHeaviestClusterF32) {
   EXPECT_GT(health.position_spread_m, 3.0);
 }
 
-TEST(SwitchingParticleFilter, SameSeedSameNumbersF26) {
+TEST(SwitchingParticleFilter, SameSeedSameNumbers) {
   SwitchingDrive d;
   d.bias = bias_between(20.0, 40.0, {10.0, 5.0});
   d.duration_s = 50.0;
@@ -176,7 +175,7 @@ TEST(SwitchingParticleFilter, AgreesWithTheInteractingModels) {
   }
 }
 
-TEST(SwitchingParticleFilter, CovarianceIsHonestF14) {
+TEST(SwitchingParticleFilter, CovarianceIsHonest) {
   double sum = 0.0;
   int count = 0;
   for (std::uint64_t seed = 101; seed < 111; ++seed) {
@@ -196,7 +195,7 @@ TEST(SwitchingParticleFilter, CovarianceIsHonestF14) {
   EXPECT_LT(sum / count, 1.6);
 }
 
-TEST(SwitchingParticleFilter, FindsAnUnknownHeadingF16) {
+TEST(SwitchingParticleFilter, FindsAnUnknownHeading) {
   SwitchingParticleFilter filter = make();
   PoseEstimate start = pose_with_sigma({}, 1.0, kPi);
   filter.initialize(start);
@@ -251,7 +250,7 @@ TEST(SwitchingParticleFilter, RefusesWhatIsNotFiniteAndSurvivesALongOutage) {
   }
 }
 
-TEST(SwitchingParticleFilter, FixThatNoParticleExplainsDoesNotAbortF30) {
+TEST(SwitchingParticleFilter, FixThatNoParticleExplainsDoesNotAbort) {
   SwitchingParticleFilter filter = make("outlier_share: 0.0");
   filter.initialize(pose_with_sigma({}, 0.1, 0.1));
   filter.correct(fix_of({1e200, 0.0}, 1.0, 1.0));

@@ -9,7 +9,8 @@
 
 #include "urban_gnss_localization/common/parameters.hpp"
 #include "urban_gnss_localization/gnss/covariance_filter.hpp"
-#include "urban_gnss_localization/gnss/receiver_memory.hpp"
+#include "urban_gnss_localization/gnss/nlos_model.hpp"
+#include "urban_gnss_localization/gnss/receiver_smoothing.hpp"
 #include "urban_gnss_localization/gnss/satellite.hpp"
 
 namespace urban_gnss {
@@ -44,17 +45,13 @@ struct GnssCovarianceParameters {
   ReceiverWeighting receiver_weighting{ReceiverWeighting::kCn0};
   double weight_cn0{40.0};
   double weight_floor{0.01};
-  double nlos_mean{25.0};
-  double nlos_sigma{25.0};
+  NlosParameters nlos{25.0, 25.0, NlosElevationLaw::kCotangent, 0.0, 3.0, -4.5};
   double nlos_hidden_exponent{0.0};
-  double nlos_elevation_exponent{0.0};
   double nlos_cn0{28.0};
-  double nlos_cn0_width{3.0};
-  double nlos_cn0_rise{-4.5};
   double nlos_if_blocked{0.9};
   double nlos_if_free{0.005};
   double nlos_if_unknown{0.1};
-  ReceiverMemoryParameters memory;
+  ReceiverSmoothingParameters smoothing;
   CovarianceFilterParameters filter;
 
   void visit(ParameterVisitor& v) {
@@ -67,23 +64,17 @@ struct GnssCovarianceParameters {
     v("receiver_weighting", receiver_weighting, "soft: how the receiver is taken to weigh its ranges, equal or cn0");
     v("weight_cn0", weight_cn0, between(0.0, 70.0), "dB-Hz", "from here on it weighs ranges equally");
     v("weight_floor", weight_floor, between(1e-6, 1.0), "", "its least weight of a range, of 1");
-    v("nlos_mean", nlos_mean, non_negative(), "m", "mean range error of a signal without line of sight");
-    v("nlos_sigma", nlos_sigma, positive(), "m", "standard deviation about that mean");
+    v.group("nlos", nlos, "The excess range of an NLOS signal.");
     v("nlos_hidden_exponent", nlos_hidden_exponent, between(0.0, 5.0), "",
-      "both grow with this power of the share of the satellites in view that is hidden,");
-    v("nlos_elevation_exponent", nlos_elevation_exponent, between(0.0, 5.0), "",
-      "and with this power of the cotangent of the elevation, 1 at 37 degrees; 0: not");
+      "excess ranges grow with this power of the hidden share of the satellites in view");
     v("nlos_cn0", nlos_cn0, between(0.0, 70.0), "dB-Hz",
-      "at which a signal at 37 degrees is as likely reflected as direct");
-    v("nlos_cn0_width", nlos_cn0_width, positive(), "dB", "that change the odds by e");
-    v("nlos_cn0_rise", nlos_cn0_rise, between(-30.0, 30.0), "dB",
-      "by which nlos_cn0 rises from the horizon to the zenith");
+      "at which a signal at 37 degrees elevation is as likely NLOS as not");
     v("nlos_if_blocked", nlos_if_blocked, between(0.001, 0.999), "",
       "probability of no line of sight where the map blocks it");
     v("nlos_if_free", nlos_if_free, between(0.001, 0.999), "", "where the map shows free space");
     v("nlos_if_unknown", nlos_if_unknown, between(0.001, 0.999), "", "where the map shows nothing");
-    v.include(memory);
-    v.include(filter);
+    v.group("smoothing", smoothing, "How the receiver smooths its solutions.");
+    v.group("filter", filter, "paper: the filter of the covariance, Algorithm 3.");
   }
   void check(std::vector<std::string>& faults) const;
 };
@@ -155,16 +146,16 @@ GnssCovariance gnss_covariance(const std::vector<SatelliteObservation>& satellit
 
 /// The least covariance that is nowhere below either: matrix - result and floor - result have no positive eigenvalue.
 /// Requires both positive definite and finite.
-Eigen::Matrix2d at_least(const Eigen::Matrix2d& matrix, const Eigen::Matrix2d& floor);
+Eigen::Matrix2d covariance_upper_bound(const Eigen::Matrix2d& matrix, const Eigen::Matrix2d& floor);
 
-/// gnss_covariance() fix by fix, with the memory of a receiver: Algorithm 3 in the paper's model, ReceiverMemory in the
-/// soft one. There, a fix whose satellites do not determine the position has R_inf alone and leaves no memory: the
+/// gnss_covariance() fix by fix, with the memory of a receiver: Algorithm 3 in the paper's model, ReceiverSmoothing in
+/// the soft one. There, a fix whose satellites do not determine the position has R_inf alone and leaves no memory: the
 /// receiver cannot have had a solution either.
 class GnssCovarianceModel {
  public:
   /// Requires parameters without faults.
   explicit GnssCovarianceModel(const GnssCovarianceParameters& parameters)
-      : parameters_(parameters), filter_(parameters.filter), memory_(parameters.memory) {}
+      : parameters_(parameters), filter_(parameters.filter), smoothing_(parameters.smoothing) {}
 
   GnssCovariance process(Stamp stamp, const std::vector<SatelliteObservation>& satellites,
                          const std::optional<SkyObservation>& sky, const std::optional<Eigen::Matrix2d>& claimed);
@@ -173,7 +164,7 @@ class GnssCovarianceModel {
  private:
   GnssCovarianceParameters parameters_;
   CovarianceFilter filter_;
-  ReceiverMemory memory_;
+  ReceiverSmoothing smoothing_;
 };
 
 }  // namespace urban_gnss

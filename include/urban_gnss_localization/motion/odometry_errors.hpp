@@ -20,7 +20,7 @@ struct OdometryErrorParameters {
     v("motion_noise_factor", motion_noise_factor, non_negative(), "",
       "on the variances of the motion noise, most of which are scale and yaw-rate error");
     v.basic()("speed_scale_sigma", speed_scale_sigma, non_negative(), "",
-      "initial standard deviation of the odometry's relative speed error");
+              "initial standard deviation of the odometry's relative speed error");
     v("speed_scale_walk", speed_scale_walk, non_negative(), "1/sqrt(s)", "its random walk");
     v("yaw_rate_bias_sigma", yaw_rate_bias_sigma, non_negative(), "rad/s",
       "initial standard deviation of the odometry's yaw-rate error");
@@ -30,9 +30,6 @@ struct OdometryErrorParameters {
     v("parked_walk", parked_walk, non_negative(), "m/sqrt(s)", "random walk of the position at a standstill");
   }
 };
-
-/// Whether the robot stands; what is left of the yaw rate is then a gyroscope's error.
-bool is_parked(const Twist2& twist);
 
 /// The motion model's step with the noise that is left where the odometry's errors are states.
 MotionStep make_motion_step(const Twist2& twist, double duration_s, const MotionParameters& motion,

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "urban_gnss_localization/gnss/fix_sanitation.hpp"
+#include "urban_gnss_localization/gnss/fix_validation.hpp"
 #include "urban_gnss_localization/localizers/nishida/bias_kalman_filter.hpp"
 #include "urban_gnss_localization/motion/odometry_history.hpp"
 #include "urban_gnss_localization/pipeline/stamp_monitor.hpp"
@@ -18,7 +18,7 @@ struct BiasPipelineParameters {
   double odometry_gap{2.0};
   double time_jump{1.0};
   bool reset_on_time_jump{true};
-  FixSanitationParameters fix;
+  FixValidationParameters fix;
   GpsBiasParameters bias;
 
   void visit(ParameterVisitor& v) {
@@ -72,7 +72,7 @@ class BiasPipeline {
   StampMonitor estimate_stamps_;
   StampMonitor fix_stamps_;
   std::deque<std::pair<Stamp, Pose2>> poses_;
-  std::deque<SanitizedFix> pending_;
+  std::deque<ValidatedFix> pending_;
   std::optional<Stamp> last_fix_stamp_;
   std::vector<BiasEstimate> estimates_;
   std::vector<PipelineEvent> events_;

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "urban_gnss_localization/gnss/datum_initializer.hpp"
-#include "urban_gnss_localization/gnss/fix_sanitation.hpp"
+#include "urban_gnss_localization/gnss/fix_validation.hpp"
 #include "urban_gnss_localization/gnss/heading_initializer.hpp"
 #include "urban_gnss_localization/localizers/localizer.hpp"
 #include "urban_gnss_localization/localizers/nishida/bias_kalman_filter.hpp"
@@ -36,7 +36,7 @@ struct LocalizationParameters {
   bool reset_on_time_jump{true};
   double heading_converged_sigma{0.3};
   DatumParameters datum;
-  FixSanitationParameters fix;
+  FixValidationParameters fix;
   HeadingInitializerParameters heading;
 
   void visit(ParameterVisitor& v) {
@@ -120,11 +120,11 @@ struct LocalizationReport {
 /// A fix that waits for the bias at its stamp.
 struct BiasQuery {
   LocalFix fix;
-  FixVerdict sanitation;
+  FixVerdict validation;
   Eigen::Vector2d predicted_antenna_position{Eigen::Vector2d::Zero()};  ///< m, map frame, at the fix's stamp
 };
 
-/// Everything between the messages and the filter, the same for every localizer, live and offline: sanitation, datum,
+/// Everything between the messages and the filter, the same for every localizer, live and offline: validation, datum,
 /// start, odometry gaps, late fixes, fixes that wait for odometry or for their bias, clocks that are set back.
 ///
 /// It acts on stamps, not on times of arrival: what it does depends only on the order in which messages come. A fix
@@ -191,11 +191,11 @@ class LocalizationPipeline {
  private:
   struct PendingFix {
     LocalFix fix;
-    FixVerdict sanitation;
+    FixVerdict validation;
   };
 
   void use_datum(const GeodeticPosition& datum, const std::string& source);
-  void sanitize(const RawFix& fix);
+  void validate(const RawFix& fix);
   void process_velocities();
   void process_fixes();
   bool process_next_fix();

@@ -6,11 +6,7 @@
 #include "urban_gnss_localization/gnss/chi_squared.hpp"
 
 namespace urban_gnss {
-namespace {
-
-constexpr int kFixDof = 2;
-
-}  // namespace
+namespace {}  // namespace
 
 EnumNames<ParticleFilterMode> enum_names(ParticleFilterMode) {
   return {{"literal", ParticleFilterMode::kLiteral},

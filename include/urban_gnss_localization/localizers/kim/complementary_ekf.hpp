@@ -10,6 +10,7 @@
 #include "urban_gnss_localization/localizers/localizer.hpp"
 #include "urban_gnss_localization/localizers/nishida/bias_kalman_filter.hpp"
 #include "urban_gnss_localization/motion/dead_reckoning.hpp"
+#include "urban_gnss_localization/motion/standstill.hpp"
 
 namespace urban_gnss {
 
@@ -20,12 +21,15 @@ enum class ComplementaryMode {
 };
 EnumNames<ComplementaryMode> enum_names(ComplementaryMode);
 
-/// What happens when the fixes contradict the estimate for long (F3).
+/// What happens when the fixes contradict the estimate for long.
 enum class LockoutPolicy {
   kAutomatic,      ///< after lockout_timeout the estimate is what is wrong: its position starts anew on the fixes
   kDeadReckoning,  ///< the odometry is believed until a fix agrees with it again, or a pose is set
 };
 EnumNames<LockoutPolicy> enum_names(LockoutPolicy);
+
+/// The Sigma_v of Kim et al.: 0.02 of the speed and 0.03 of the yaw rate, per sqrt(Hz).
+MotionParameters kim_motion();
 
 struct ComplementaryEkfParameters {
   ComplementaryMode mode{ComplementaryMode::kCompensated};
@@ -40,9 +44,11 @@ struct ComplementaryEkfParameters {
   double lockout_timeout{20.0};
   double bias_open_timeout{120.0};
   double lockout_gap{5.0};
+  bool estimate_odometry_errors{true};
   BiasDetectorParameters detector;
   FixNoiseParameters fix_noise;
-  DeadReckoningParameters odometry;
+  OdometryErrorParameters odometry{1.0, 0.02, 2e-4, 0.005, 3e-5, 0.05, 0.003, 0.0};
+  MotionParameters motion = kim_motion();
 
   void visit(ParameterVisitor& v) {
     v.basic()("mode", mode,
@@ -67,9 +73,12 @@ struct ComplementaryEkfParameters {
     v("bias_open_timeout", bias_open_timeout, positive(), "s", "of an open bias filter");
     v("lockout_gap", lockout_gap, positive(), "s",
       "without a fix that end such a run: after a blackout it counts anew");
+    v("estimate_odometry_errors", estimate_odometry_errors,
+      "speed scale and yaw-rate bias as states; false: the paper's (x, y, heading)");
     v.group("detector", detector, "When a fix is taken for biased.");
     v.group("fix_noise", fix_noise, "The noise of the fixes, as they show it.");
-    v.group("odometry", odometry, "The odometry's noise and errors.");
+    v.group("odometry", odometry, "The odometry's own errors.");
+    v.group("motion", motion, "Noise of the motion, Nishida et al. eq. (5) to (8).");
   }
 };
 
@@ -114,7 +123,7 @@ class ComplementaryEkf : public Localizer {
   bool is_bias_open() const { return is_open_; }
   Eigen::Vector2d bias() const { return filter_.bias(); }
   Eigen::Matrix2d bias_covariance() const { return filter_.bias_covariance(); }
-  /// Whether the gate cannot find anything, as the NIS runs far below its expectation (F4).
+  /// Whether the gate cannot find anything, as the NIS runs far below its expectation.
   bool is_gate_inert() const { return is_inert_; }
   /// smallest_detectable_jump (m) at the last fix; 0 before the first.
   double smallest_detectable_jump_m() const;
@@ -189,8 +198,7 @@ class ComplementaryEkf : public Localizer {
   bool is_inert_{false};
   std::optional<Run> run_;
   std::optional<HeadingInitializer> heading_search_;  ///< while the heading is unknown
-  double moved_since_fix_m_{0.0};
-  double elapsed_since_fix_s_{0.0};  ///< of odometry
+  Travel since_fix_;                                  ///< of odometry
   Eigen::Matrix2d last_test_covariance_{Eigen::Matrix2d::Zero()};
   std::vector<BiasEstimate> bias_estimates_;
 };

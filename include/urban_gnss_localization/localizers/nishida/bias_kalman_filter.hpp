@@ -87,10 +87,10 @@ class BiasTracker {
  public:
   explicit BiasTracker(const GpsBiasParameters& parameters);
 
-  /// Takes one sanitised fix, with the antenna position that the localizer predicted for the fix's stamp from its last
+  /// Takes one validated fix, with the antenna position that the localizer predicted for the fix's stamp from its last
   /// estimate and the odometry since. Requires stamps that ascend.
   const BiasEstimate& process(const LocalFix& fix, const Eigen::Vector2d& predicted_antenna_position,
-                              const FixVerdict& sanitation = {});
+                              const FixVerdict& validation = {});
 
   const BiasEstimate& estimate() const { return estimate_; }
   void reset();

@@ -3,7 +3,6 @@
 #include <Eigen/Core>
 #include <cstddef>
 #include <limits>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -40,8 +39,8 @@ struct SwitchingModelParameters {
     v.group("odometry", odometry, "The odometry's own errors, which the filter estimates.");
     v("yaw_rate_scale_sigma", yaw_rate_scale_sigma, non_negative(), "",
       "standard deviation of the odometry's relative yaw-rate error, a constant");
-    v("fix_scale_lag", fix_scale_lag, non_negative(), "",
-      "s apart at which fixes are compared with the odometry between them; 0: never");
+    v("fix_scale_lag", fix_scale_lag, non_negative(), "s",
+      "between the fixes that are compared with the odometry between them; 0: none are");
     v("common_error_sigma", common_error_sigma, non_negative(), "m per axis",
       "error that fixes share for long, as far as they declare as much");
   }
@@ -122,55 +121,5 @@ BiasEkfUpdate take_fix(BiasGaussian& state, BiasMode mode, const FixMeasurement&
 /// yaw and speed scale. The likelihood is but for a constant.
 BiasEkfUpdate take_velocity(BiasGaussian& state, const VelocityMeasurement& measured, const Eigen::Matrix2d& noise,
                             double student_dof);
-
-/// What the filters learn of the receiver beside the state, and remember of the time.
-class ReceiverModel {
- public:
-  /// Requires parameters without faults.
-  explicit ReceiverModel(const SwitchingModelParameters& parameters);
-
-  /// Forgets everything.
-  void reset();
-  void move(const Twist2& twist, double duration_s);
-
-  /// s >= 0 since the last fix; since the start where there was none.
-  double elapsed_s(double time_s) const;
-  /// The fix as far as it is believed: what its ranges say beside the state `before` it (range_fix()) where it has
-  /// them, else with its covariance by FixNoiseModel::believed(). Once a fix, before the others of this class.
-  FixMeasurement believed(const FixMeasurement& fix, const BiasGaussian& before);
-  /// Whether the last fix was what its ranges say.
-  bool of_ranges() const { return of_ranges_; }
-  /// m, of a range in line of sight, as learnt.
-  double range_sigma_m() const;
-  FixNoise fix_noise(double time_s) const {
-    if (of_ranges_) return {1.0, range_noise_.correlation_inflation(time_s), true};
-    return {noise_.scale(), noise_.correlation_inflation(time_s), false};
-  }
-  /// Prior odds of a bias of the fix, against those of the parameters: bias_odds of mode_transition().
-  double bias_odds() const { return of_ranges_ ? parameters_.ranges.range_bias_odds : 1.0; }
-  /// A fix was taken, with a share `exceeding` of its NIS beyond the median.
-  void learn_fix(double time_s, double exceeding);
-  /// Lets the noise model see the fix beside the odometry alone; `before` and `after` it, all modes together.
-  void compare_with_odometry(const FixMeasurement& fix, const BiasGaussian& before, const BiasGaussian& after);
-
-  double velocity_scale() const { return velocity_scale_.value(); }
-  /// A velocity was taken; `before` and `after` it, all modes together.
-  void learn_velocity(double exceeding, const BiasGaussian& before, const BiasGaussian& after);
-
-  /// m^2 per axis, of the error that all fixes share.
-  double common_variance_m2() const { return common_variance_m2_; }
-
- private:
-  SwitchingModelParameters parameters_;
-  FixNoiseModel noise_;
-  FixNoiseModel range_noise_;
-  FreeSignalLevel free_signals_;
-  bool of_ranges_{false};  ///< the last fix
-  LearntScale velocity_scale_;
-  std::optional<double> last_fix_s_;
-  double moved_s_{0.0};                                   ///< of odometry since the start
-  Eigen::Vector2d corrections_{Eigen::Vector2d::Zero()};  ///< m, what fixes and velocities have moved the position by
-  double common_variance_m2_{0.0};
-};
 
 }  // namespace urban_gnss

@@ -7,7 +7,7 @@
 
 #include "urban_gnss_localization/common/parameters.hpp"
 #include "urban_gnss_localization/localizers/switching/learnt_scale.hpp"
-#include "urban_gnss_localization/motion/motion_model.hpp"
+#include "urban_gnss_localization/motion/standstill.hpp"
 
 namespace urban_gnss {
 
@@ -66,7 +66,7 @@ class FixNoiseModel {
   /// The next fix declares `declared` (m^2, positive definite): as far as its ups and downs are believed. Its size is
   /// drawn towards the geometric mean of those declared lately, by the power 1 - fix_covariance_weight, at most by a
   /// factor of 4.
-  Eigen::Matrix2d believed(const Eigen::Matrix2d& declared);
+  Eigen::Matrix2d effective_covariance(const Eigen::Matrix2d& declared);
   /// Factor on the covariance of a fix at `time_s` by which correlation lowers its worth, at least 1.
   double correlation_inflation(double time_s) const;
 
@@ -90,8 +90,7 @@ class FixNoiseModel {
   std::optional<LearntScale> lagged_scale_;
   std::deque<DeadReckonedFix> fixes_;
   std::optional<double> last_s_;
-  double moved_m_{0.0};
-  double elapsed_s_{0.0};
+  Travel since_fix_;
 };
 
 }  // namespace urban_gnss
