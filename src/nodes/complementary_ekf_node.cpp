@@ -23,9 +23,8 @@ class ComplementaryEkfNode {
     read_private_parameters(private_node, shell_parameters_, filter);
     bias_publisher_ = node.advertise<urban_gnss_localization::GpsBias>(topics::kBias, 100);
     marker_publisher_ = node.advertise<visualization_msgs::MarkerArray>(topics::kBiasMarkers, 2);
-    auto localizer = std::make_unique<ComplementaryEkf>(filter);
-    filter_ = localizer.get();
-    shell_ = std::make_unique<LocalizerNode>(node, private_node, shell_parameters_, std::move(localizer),
+    shell_ = std::make_unique<LocalizerNode>(node, private_node, shell_parameters_,
+                                             std::make_unique<ComplementaryEkf>(filter),
                                              [this](const LocalizationOutput&) { publish_biases(); });
     private_node.setParam("mode", enum_name(filter.mode));  // the server starts from what is there
     reconfigure_server_ = std::make_unique<ReconfigureServer>(private_node);
@@ -36,34 +35,35 @@ class ComplementaryEkfNode {
  private:
   using ReconfigureServer = dynamic_reconfigure::Server<urban_gnss_localization::ComplementaryEkfConfig>;
 
+  ComplementaryEkf& filter() { return dynamic_cast<ComplementaryEkf&>(shell_->pipeline().localizer()); }
+
   void reconfigure(urban_gnss_localization::ComplementaryEkfConfig& config) {
     for (const auto& [name, mode] : enum_names(ComplementaryMode())) {
       if (config.mode != name) continue;
-      if (config.mode != filter_->mode()) ROS_INFO_STREAM("mode: " << config.mode);
-      filter_->set_mode(mode);
+      if (config.mode != filter().mode()) ROS_INFO_STREAM("mode: " << config.mode);
+      filter().set_mode(mode);
       return;
     }
-    ROS_ERROR_STREAM("mode: there is no '" << config.mode << "'; it stays " << filter_->mode());
-    config.mode = filter_->mode();
+    ROS_ERROR_STREAM("mode: there is no '" << config.mode << "'; it stays " << filter().mode());
+    config.mode = filter().mode();
   }
 
   void publish_biases() {
-    for (const BiasEstimate& bias : filter_->take_bias_estimates()) {
+    for (const BiasEstimate& bias : shell_->pipeline().take_bias_estimates()) {
       bias_publisher_.publish(to_message(bias, shell_parameters_.frames.map));
       if (marker_publisher_.getNumSubscribers() > 0) {
         marker_publisher_.publish(bias_markers(bias, shell_parameters_.frames.map));
       }
     }
-    if (filter_->is_gate_inert()) {
+    if (filter().is_gate_inert()) {
       ROS_WARN_STREAM_THROTTLE(60.0, "gate inert: the fixes scatter far less than their covariance says; a bias below "
-                                         << filter_->smallest_detectable_jump_m() << " m is not found at once");
+                                         << filter().smallest_detectable_jump_m() << " m is not found at once");
     }
   }
 
   LocalizerNodeParameters shell_parameters_;
   ros::Publisher bias_publisher_;
   ros::Publisher marker_publisher_;
-  ComplementaryEkf* filter_{nullptr};  ///< owned by the shell's pipeline
   std::unique_ptr<LocalizerNode> shell_;
   std::unique_ptr<ReconfigureServer> reconfigure_server_;
 };

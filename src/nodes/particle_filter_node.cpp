@@ -28,10 +28,9 @@ class ParticleFilterNode {
     read_private_parameters(private_node, shell_parameters_, filter, motion, cloud_parameters_);
     poses_publisher_ = node.advertise<geometry_msgs::PoseArray>(topics::kParticles, 2);
     cloud_publisher_ = node.advertise<sensor_msgs::PointCloud2>(topics::kWeightedParticles, 2);
-    auto localizer = make_particle_filter(filter, motion);
-    filter_ = localizer.get();
-    shell_ = std::make_unique<LocalizerNode>(node, private_node, shell_parameters_, std::move(localizer),
-                                             [this](const LocalizationOutput& output) { publish_particles(output); });
+    shell_ =
+        std::make_unique<LocalizerNode>(node, private_node, shell_parameters_, make_particle_filter(filter, motion),
+                                        [this](const LocalizationOutput& output) { publish_particles(output); });
   }
 
  private:
@@ -44,11 +43,12 @@ class ParticleFilterNode {
     last_published_ = output.stamp;
     const ros::Time time = to_ros(output.stamp);
     const std::string& frame = shell_parameters_.frames.map;
+    const auto& filter = dynamic_cast<const ParticleLocalizer&>(shell_->pipeline().localizer());
     if (poses_publisher_.getNumSubscribers() > 0) {
-      poses_publisher_.publish(to_pose_array(filter_->particles(), time, frame));
+      poses_publisher_.publish(to_pose_array(filter.particles(), time, frame));
     }
     if (cloud_publisher_.getNumSubscribers() > 0) {
-      cloud_publisher_.publish(to_point_cloud(filter_->particles(), time, frame));
+      cloud_publisher_.publish(to_point_cloud(filter.particles(), time, frame));
     }
   }
 
@@ -56,7 +56,6 @@ class ParticleFilterNode {
   CloudParameters cloud_parameters_;
   ros::Publisher poses_publisher_;
   ros::Publisher cloud_publisher_;
-  const ParticleLocalizer* filter_{nullptr};  ///< owned by the shell's pipeline
   Stamp last_published_{0};
   std::unique_ptr<LocalizerNode> shell_;
 };

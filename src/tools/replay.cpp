@@ -20,9 +20,10 @@
 #include "urban_gnss_localization/evaluation/report_json.hpp"
 #include "urban_gnss_localization/evaluation/tum.hpp"
 #include "urban_gnss_localization/localizers/kim/complementary_ekf.hpp"
+#include "urban_gnss_localization/localizers/maier/ukf.hpp"
 #include "urban_gnss_localization/localizers/switching/imm_ekf.hpp"
 #include "urban_gnss_localization/localizers/switching/switching_particle_filter.hpp"
-#include "urban_gnss_localization/localizers/maier/ukf.hpp"
+#include "urban_gnss_localization/pipeline/bias_responder.hpp"
 #include "urban_gnss_localization/ros/conversions.hpp"
 #include "urban_gnss_localization/ros/topics.hpp"
 #include "urban_gnss_localization/ros/visibility_messages.hpp"
@@ -39,7 +40,7 @@ class Replay {
   Replay(const ReplayOptions& options, const ReplayParameters& parameters)
       : parameters_(parameters),
         pipeline_(parameters.node.localization, make_localizer(options.localizer, parameters)),
-        bias_tracker_(parameters.bias) {
+        bias_responder_(parameters.bias) {
     if (!options.output.empty()) {
       const fs::path path(options.output);
       if (path.has_parent_path()) fs::create_directories(path.parent_path());
@@ -105,27 +106,14 @@ class Replay {
     if (name == "particle_filter") return make_particle_filter(parameters.filter, parameters.motion);
     if (name == "imm_ekf") return std::make_unique<ImmEkf>(parameters.imm, parameters.motion);
     if (name == "ukf") return std::make_unique<Ukf>(parameters.ukf, parameters.motion);
-    if (name == "complementary_ekf") {
-      auto filter = std::make_unique<ComplementaryEkf>(parameters.complementary);
-      complementary_ = filter.get();
-      return filter;
-    }
+    if (name == "complementary_ekf") return std::make_unique<ComplementaryEkf>(parameters.complementary);
     throw std::runtime_error("--localizer " + name +
                              ": no such localizer; there are particle_filter, imm_ekf, complementary_ekf, ukf");
   }
 
   /// Answers the pipeline's questions for the bias, as gps_bias_node does live, and writes what came of it.
   void settle() {
-    if (pipeline_.epoch() != epoch_) {
-      epoch_ = pipeline_.epoch();
-      bias_tracker_.reset();
-    }
-    while (const auto query = pipeline_.bias_query()) {
-      const BiasEstimate& bias =
-          bias_tracker_.process(query->fix, query->predicted_antenna_position, query->sanitation);
-      write(topics::kBias, bias.stamp, to_message(bias, parameters_.node.frames.map));
-      pipeline_.add_bias(bias);
-    }
+    write_biases(bias_responder_.answer(pipeline_));
     for (const PipelineEvent& event : pipeline_.take_events()) {
       std::cerr << "[" << std::fixed << std::setprecision(3) << to_seconds(newest_) << "] " << event.text << '\n';
     }
@@ -136,15 +124,17 @@ class Replay {
       tf.transforms.push_back(to_map_to_odom(output, parameters_.node.frames, parameters_.node.transform_time_offset));
       write("tf", output.stamp, tf);
     }
-    if (complementary_) {
-      for (const BiasEstimate& bias : complementary_->take_bias_estimates()) {
-        write(topics::kBias, bias.stamp, to_message(bias, parameters_.node.frames.map));
-      }
-    }
+    write_biases(pipeline_.take_bias_estimates());
     const std::vector<FixVerdict> verdicts = pipeline_.take_verdicts();
     for (const FixVerdict& verdict : verdicts) ++decisions_[to_string(verdict.decision)];
     for (const auto& status : to_status_messages(pipeline_, verdicts, to_ros(newest_), parameters_.node.frames.map)) {
       write(topics::kStatus, newest_, status);
+    }
+  }
+
+  void write_biases(const std::vector<BiasEstimate>& biases) {
+    for (const BiasEstimate& bias : biases) {
+      write(topics::kBias, bias.stamp, to_message(bias, parameters_.node.frames.map));
     }
   }
 
@@ -154,11 +144,9 @@ class Replay {
   }
 
   ReplayParameters parameters_;
-  ComplementaryEkf* complementary_{nullptr};  ///< the pipeline's localizer, where it is that one
   LocalizationPipeline pipeline_;
-  BiasTracker bias_tracker_;
+  BiasResponder bias_responder_;
   rosbag::Bag bag_;
-  std::size_t epoch_{0};
   Stamp newest_{0};
   std::optional<GeodeticPosition> bag_datum_;
   Trajectory estimate_;

@@ -3,13 +3,13 @@
 #include <optional>
 #include <vector>
 
-#include "urban_gnss_localization/localizers/kim/bias_detector.hpp"
-#include "urban_gnss_localization/localizers/nishida/bias_kalman_filter.hpp"
-#include "urban_gnss_localization/motion/dead_reckoning.hpp"
-#include "urban_gnss_localization/localizers/kim/fix_noise_monitor.hpp"
-#include "urban_gnss_localization/localizers/localizer.hpp"
-#include "urban_gnss_localization/localizers/kim/two_stage_filter.hpp"
 #include "urban_gnss_localization/gnss/heading_initializer.hpp"
+#include "urban_gnss_localization/localizers/bias_estimate.hpp"
+#include "urban_gnss_localization/localizers/kim/bias_detector.hpp"
+#include "urban_gnss_localization/localizers/kim/fix_noise_monitor.hpp"
+#include "urban_gnss_localization/localizers/kim/two_stage_filter.hpp"
+#include "urban_gnss_localization/localizers/localizer.hpp"
+#include "urban_gnss_localization/motion/dead_reckoning.hpp"
 
 namespace urban_gnss {
 
@@ -115,8 +115,7 @@ class ComplementaryEkf : public Localizer {
   /// smallest_detectable_jump (m) at the last fix; 0 before the first.
   double smallest_detectable_jump_m() const;
 
-  /// One for every fix since the last call, as gps/bias says it.
-  std::vector<BiasEstimate> take_bias_estimates();
+  std::vector<BiasEstimate> take_bias_estimates() override;
 
  private:
   using Filter = TwoStageFilter<kErrorStates, 2, 2>;
