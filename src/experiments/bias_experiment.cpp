@@ -26,9 +26,8 @@ class Contestant {
       : is_withheld_(contestant.is_withheld), run_(run) {
     conditions.filter.mode = contestant.mode;
     conditions.filter.adapt_every_mode = contestant.is_adapted;
-    auto filter = std::make_unique<ComplementaryEkf>(conditions.filter);
-    filter_ = filter.get();
-    pipeline_ = std::make_unique<LocalizationPipeline>(conditions.localization, std::move(filter));
+    pipeline_ = std::make_unique<LocalizationPipeline>(conditions.localization,
+                                                       std::make_unique<ComplementaryEkf>(conditions.filter));
     pipeline_->set_antenna_offset(scenario.vehicle.antenna().head<2>());
     pipeline_->set_datum(scenario.datum);
   }
@@ -50,14 +49,13 @@ class Contestant {
     for (const LocalizationOutput& output : pipeline_->take_outputs()) {
       run_.estimate.push_back({output.stamp, output.estimate.pose, output.estimate.covariance});
     }
-    for (BiasEstimate& bias : filter_->take_bias_estimates()) run_.biases.push_back(std::move(bias));
+    for (BiasEstimate& bias : pipeline_->take_bias_estimates()) run_.biases.push_back(std::move(bias));
     pipeline_->take_events();
     pipeline_->take_verdicts();
   }
 
   bool is_withheld_;
   BiasContestantRun& run_;
-  ComplementaryEkf* filter_;  ///< owned by the pipeline
   std::unique_ptr<LocalizationPipeline> pipeline_;
 };
 

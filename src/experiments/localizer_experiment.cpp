@@ -7,6 +7,7 @@
 #include "urban_gnss_localization/experiments/city_drive.hpp"
 #include "urban_gnss_localization/geometry/isometry.hpp"
 #include "urban_gnss_localization/geometry/local_frame.hpp"
+#include "urban_gnss_localization/pipeline/bias_responder.hpp"
 
 namespace urban_gnss {
 namespace {
@@ -18,7 +19,7 @@ class Participant : public DriveParticipant {
               Trajectory& estimate)
       : frame_(scenario.datum),
         localization_(conditions.localization, contender.make()),
-        bias_tracker_(conditions.bias),
+        bias_responder_(conditions.bias),
         estimate_(estimate) {
     const Eigen::Vector3d antenna = scenario.vehicle.antenna();
     localization_.set_antenna_offset(antenna.head<2>());
@@ -72,13 +73,7 @@ class Participant : public DriveParticipant {
 
  private:
   void settle() {
-    if (localization_.epoch() != epoch_) {
-      epoch_ = localization_.epoch();
-      bias_tracker_.reset();
-    }
-    while (const auto query = localization_.bias_query()) {
-      localization_.add_bias(bias_tracker_.process(query->fix, query->predicted_antenna_position, query->validation));
-    }
+    bias_responder_.answer(localization_);
     for (const LocalizationOutput& output : localization_.take_outputs()) {
       estimate_.push_back({output.stamp, output.estimate.pose, output.estimate.covariance});
       if (!occlusion_) continue;
@@ -91,8 +86,7 @@ class Participant : public DriveParticipant {
 
   LocalFrame frame_;
   LocalizationPipeline localization_;
-  BiasTracker bias_tracker_;
-  std::size_t epoch_{0};
+  BiasResponder bias_responder_;
   std::unique_ptr<OcclusionPipeline> occlusion_;
   Trajectory& estimate_;
 };

@@ -6,28 +6,21 @@
 
 namespace urban_gnss {
 
-void BiasPipelineParameters::check(std::vector<std::string>& faults) const {
-  if (antenna_offset.size() != 2) faults.push_back("antenna_offset: must be x and y (m)");
-}
-
 BiasPipeline::BiasPipeline(const BiasPipelineParameters& parameters)
     : parameters_(parameters),
+      antenna_(parameters.input.antenna()),
       tracker_(parameters.bias),
+      clocks_(parameters.input.stamps),
       history_(kHistory_s),
-      odometry_stamps_(parameters.time_jump),
-      estimate_stamps_(parameters.time_jump),
-      fix_stamps_(parameters.time_jump) {}
+      fixes_(parameters.input.fix_validation) {}
 
 void BiasPipeline::reset(const std::string& why) {
   if (!why.empty()) events_.push_back({PipelineEvent::Level::kWarn, "reset: " + why});
   tracker_.reset();
+  clocks_.reset();
   history_.clear();
-  odometry_stamps_.reset();
-  estimate_stamps_.reset();
-  fix_stamps_.reset();
   poses_.clear();
-  pending_.clear();
-  last_fix_stamp_.reset();
+  fixes_.reset();
 }
 
 void BiasPipeline::set_datum(const GeodeticPosition& datum) {
@@ -37,52 +30,41 @@ void BiasPipeline::set_datum(const GeodeticPosition& datum) {
   frame_ = std::move(frame);
 }
 
-bool BiasPipeline::is_new(StampMonitor& monitor, Stamp stamp, const char* stream) {
-  return monitor.accept(stamp, [&](Stamp) {
-    if (parameters_.reset_on_time_jump) reset(std::string("the clock of the ") + stream + " jumped back");
-    return parameters_.reset_on_time_jump;
-  });
+bool BiasPipeline::is_new(InputStream stream, Stamp stamp) {
+  return clocks_.accept(stream, stamp, [this](const std::string& why) { reset(why); });
 }
 
 void BiasPipeline::add_odometry(const OdometrySample& sample) {
   if (!odometry_fault(sample).empty()) return;
-  if (!is_new(odometry_stamps_, sample.stamp, "odometry")) return;
-  if (!history_.empty() && to_seconds(sample.stamp - history_.latest()) > parameters_.odometry_gap) {
+  if (!is_new(InputStream::kOdometry, sample.stamp)) return;
+  const double odometry_gap = parameters_.input.stamps.odometry_gap;
+  if (!history_.empty() && to_seconds(sample.stamp - history_.latest()) > odometry_gap) {
     // The localizer starts anew after such a gap, and what the fix is compared with is another estimate.
     history_.clear();
     tracker_.reset();
   }
   history_.add(sample.stamp, sample.twist);
-  while (process_next_fix()) {
-  }
+  process_fixes();
 }
 
 void BiasPipeline::add_estimate(Stamp stamp, const Pose2& pose) {
   if (!is_finite(pose)) return;
-  if (!is_new(estimate_stamps_, stamp, "estimate")) return;
+  if (!is_new(InputStream::kEstimates, stamp)) return;
   poses_.emplace_back(stamp, pose);
   while (poses_.size() > 2 && to_seconds(stamp - poses_.front().first) > kHistory_s) poses_.pop_front();
-  while (process_next_fix()) {
-  }
+  process_fixes();
 }
 
 void BiasPipeline::add_fix(const RawFix& fix) {
   if (!frame_) return;
-  // A receiver that does not know where it is may not know the time either.
-  if (is_usable_position(fix)) is_new(fix_stamps_, fix.stamp, "fixes");  // validation judges the rest
-  ValidatedFix sane = validate_fix(fix, *frame_, last_fix_stamp_, parameters_.fix);
-  if (is_rejected(sane.verdict.decision)) {
-    reject(sane.verdict);
-    return;
-  }
-  last_fix_stamp_ = fix.stamp;
-  if (pending_.size() >= kMaxWaitingFixes) pending_.pop_front();
-  pending_.push_back(std::move(sane));
-  while (process_next_fix()) {
-  }
+  // A receiver that does not know where it is may not know the time either. What is not new, the validation rejects.
+  if (is_usable_position(fix)) is_new(InputStream::kFixes, fix.stamp);
+  fixes_.add(fix);
+  for (const FixVerdict& rejected : fixes_.validate(*frame_)) pass_on(rejected);
+  process_fixes();
 }
 
-void BiasPipeline::reject(const FixVerdict& verdict) {
+void BiasPipeline::pass_on(const FixVerdict& verdict) {
   BiasEstimate unchanged = tracker_.estimate();
   unchanged.stamp = verdict.stamp;
   unchanged.verdict = verdict;
@@ -101,25 +83,30 @@ std::optional<Pose2> BiasPipeline::pose_at(Stamp stamp) const {
   return std::nullopt;
 }
 
+void BiasPipeline::process_fixes() {
+  while (process_next_fix()) {
+  }
+}
+
 bool BiasPipeline::process_next_fix() {
-  if (pending_.empty() || poses_.empty()) return false;
-  const ValidatedFix& next = pending_.front();
-  const Stamp stamp = next.fix.stamp;
+  const ValidatedFix* next = fixes_.next();
+  if (next == nullptr || poses_.empty()) return false;
+  const Stamp stamp = next->fix.stamp;
   const bool has_estimate = poses_.back().first >= stamp;
   const bool has_waited = !history_.empty() && to_seconds(history_.latest() - stamp) >= parameters_.estimate_timeout;
   if (!has_estimate && !has_waited) return false;
-  if (const auto pose = pose_at(stamp)) {
-    const Eigen::Vector2d offset(parameters_.antenna_offset[0], parameters_.antenna_offset[1]);
-    estimates_.push_back(tracker_.process(next.fix, transform_point(*pose, offset), next.verdict));
-  } else {
-    // Without odometry between the estimate and the fix the wait may still be worth it.
-    if (!has_waited && (history_.empty() || history_.latest() < stamp)) return false;
-    FixVerdict verdict = next.verdict;
-    verdict.decision = FixDecision::kNotExamined;
-    verdict.reason = "no estimate at its stamp";
-    reject(verdict);
+  const std::optional<Pose2> pose = pose_at(stamp);
+  // Without odometry between the estimate and the fix the wait may still be worth it.
+  if (!pose && !has_waited && (history_.empty() || history_.latest() < stamp)) return false;
+
+  ValidatedFix fix = fixes_.pop();
+  if (pose) {
+    estimates_.push_back(tracker_.process(fix.fix, transform_point(*pose, antenna_), fix.verdict));
+    return true;
   }
-  pending_.pop_front();
+  fix.verdict.decision = FixDecision::kNotExamined;
+  fix.verdict.reason = "no estimate at its stamp";
+  pass_on(fix.verdict);
   return true;
 }
 
@@ -129,7 +116,7 @@ std::vector<PipelineEvent> BiasPipeline::take_events() { return std::exchange(ev
 std::string BiasPipeline::waiting_for() const {
   if (!frame_) return "gps/datum";
   if (poses_.empty()) return "odometry/filtered";
-  if (!last_fix_stamp_) return "a usable fix";
+  if (!fixes_.last_stamp()) return "a usable fix";
   return {};
 }
 

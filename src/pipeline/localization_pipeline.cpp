@@ -1,7 +1,6 @@
 #include "urban_gnss_localization/pipeline/localization_pipeline.hpp"
 
-#include <algorithm>
-#include <cmath>
+#include <sstream>
 #include <utility>
 
 #include "limits.hpp"
@@ -9,19 +8,7 @@
 
 namespace urban_gnss {
 
-namespace {
-
-bool is_same_epoch(Stamp a, Stamp b) { return std::abs(to_seconds(a - b)) <= kSameEpoch_s; }
-
-}  // namespace
-
-void LocalizationParameters::check(std::vector<std::string>& faults) const {
-  if (!initial_pose.empty() && initial_pose.size() != 3) {
-    faults.push_back("initial_pose: has " + std::to_string(initial_pose.size()) +
-                     " numbers; must be x, y (m) and yaw (rad), or empty");
-  }
-  if (antenna_offset.size() != 2) faults.push_back("antenna_offset: must be x and y (m)");
-}
+using Level = PipelineEvent::Level;
 
 Pose2 map_to_odometry(const LocalizationOutput& output) {
   return compose(output.estimate.pose, inverse(output.odometry_pose));
@@ -31,283 +18,311 @@ LocalizationPipeline::LocalizationPipeline(const LocalizationParameters& paramet
                                            std::unique_ptr<Localizer> localizer)
     : parameters_(parameters),
       localizer_(std::move(localizer)),
-      datum_initializer_(parameters.datum),
-      heading_initializer_(parameters.heading),
+      antenna_(parameters.input.antenna()),
+      clocks_(parameters.input.stamps),
+      datum_(parameters.datum),
       history_(kHistory_s),
-      odometry_stamps_(parameters.time_jump),
-      fix_stamps_(parameters.time_jump),
-      imu_stamps_(parameters.time_jump),
-      velocity_stamps_(parameters.time_jump) {
+      yaw_rate_(parameters.imu, parameters.input.stamps.odometry_gap),
+      velocities_(parameters.velocity),
+      fixes_(parameters.input.fix_validation),
+      biases_(parameters.bias),
+      start_(parameters.start),
+      reporter_(parameters.status, parameters.input.stamps.odometry_gap) {
   reset({});
 }
 
 void LocalizationPipeline::reset(const std::string& why) {
-  if (!why.empty()) event(PipelineEvent::Level::kWarn, "reset: " + why);
-  datum_initializer_.reset();
-  forget_start();
+  if (!why.empty()) event(Level::kWarn, "reset: " + why);
+  datum_.reset();
   history_.clear();
   ++epoch_;
-  last_odometry_.reset();
-  imu_yaw_rates_.clear();
-  yaw_rate_check_.emplace();
-  without_imu_s_ = 0.0;
-  imu_is_silent_ = true;
-  before_datum_.clear();
-  pending_.clear();
-  pending_velocities_.clear();
-  last_fix_stamp_.reset();
-  biases_.clear();
-  satellites_.clear();
-  fixes_have_satellites_ = false;
-  last_taken_.reset();
-  last_radius_m_ = 0.0;
-  initialized_ = false;
-  lost_ = false;
-  heading_unknown_ = false;
-  far_since_.reset();
-  last_used_.reset();
-  last_verdict_ = {};
-  fixes_used_ = 0;
-  fixes_rejected_ = 0;
-  fixes_with_ranges_ = 0;
-  velocities_used_ = 0;
+  yaw_rate_.reset();
+  velocities_.reset();
+  fixes_.reset();
+  satellites_.reset();
+  biases_.reset();
   start_.reset();
-  if (parameters_.initial_pose.size() == 3) {
-    PoseEstimate start;
-    start.pose = {parameters_.initial_pose[0], parameters_.initial_pose[1], wrap_angle(parameters_.initial_pose[2])};
-    const double p2 = parameters_.initial_position_sigma * parameters_.initial_position_sigma;
-    const double h2 = parameters_.initial_heading_sigma * parameters_.initial_heading_sigma;
-    start.covariance = Eigen::Vector3d(p2, p2, h2).asDiagonal();
-    start_ = start;
-  }
-  if (!datum_was_set_) {
-    frame_.reset();
-    if (const auto datum = datum_initializer_.fixed()) use_datum(*datum, "parameter");
-  }
+  reporter_.reset();
+  if (frame()) event(Level::kInfo, datum_.describe());
 }
 
-bool LocalizationPipeline::is_new(StampMonitor& monitor, Stamp stamp, const char* stream) {
-  return monitor.accept(stamp, [&](Stamp back) {
-    if (!parameters_.reset_on_time_jump) return false;
-    reset(std::string("the clock of the ") + stream + " jumped back by " + seconds_text(to_seconds(back)));
-    for (StampMonitor* each : {&odometry_stamps_, &fix_stamps_, &imu_stamps_, &velocity_stamps_}) each->reset();
-    return true;
-  });
+bool LocalizationPipeline::is_new(InputStream stream, Stamp stamp) {
+  return clocks_.accept(stream, stamp, [this](const std::string& why) { reset(why); });
+}
+
+bool LocalizationPipeline::is_far_ahead(Stamp stamp) const {
+  return !history_.empty() && to_seconds(stamp - history_.latest()) > kMaxAhead_s;
 }
 
 void LocalizationPipeline::add_odometry(const OdometrySample& sample) {
   const std::string fault = odometry_fault(sample);
   if (!fault.empty()) {
-    event(PipelineEvent::Level::kWarn, "odometry left out: " + fault);
+    event(Level::kWarn, "odometry left out: " + fault);
     return;
   }
-  if (!is_new(odometry_stamps_, sample.stamp, "odometry")) return;
+  if (!is_new(InputStream::kOdometry, sample.stamp)) return;
 
-  const double elapsed_s = last_odometry_ ? to_seconds(sample.stamp - last_odometry_->stamp) : 0.0;
-  const Twist2 twist = with_imu(sample, last_odometry_ ? last_odometry_->stamp : sample.stamp);
-  if (elapsed_s > parameters_.odometry_gap) {
-    event(PipelineEvent::Level::kWarn, "no odometry for " + seconds_text(elapsed_s) +
-                                           (initialized_ ? ": place unknown, starting anew from the fixes" : ""));
-    history_.clear();
-    ++epoch_;
-    forget_start();
-    lost_ = lost_ || initialized_;
-    initialized_ = false;
-  }
+  const Stamp since = history_.empty() ? sample.stamp : history_.latest();
+  const double elapsed_s = to_seconds(sample.stamp - since);
+  const Twist2 twist = yaw_rate_.twist_of(sample, since, events_);
+  if (elapsed_s > parameters_.input.stamps.odometry_gap) forget_odometry(elapsed_s);
   history_.add(sample.stamp, twist);
-  last_odometry_ = sample;
-  last_odometry_->twist = twist;
-  if (initialized_ && elapsed_s > 0.0) {
+  if (initialized() && elapsed_s > 0.0) {
     localizer_->move(twist, elapsed_s);
     guard_against_non_finite();
   }
-  if (!initialized_ && start_ && frame_) start(*start_, "the given pose");
+  if (!initialized() && start_.given() && frame()) start_from({*start_.given(), "the given pose"});
   process_velocities();
   process_fixes();
-  if (initialized_) outputs_.push_back({sample.stamp, localizer_->estimate(), sample.pose, twist});
+  if (initialized()) outputs_.push_back({sample.stamp, localizer_->estimate(), sample.pose, twist});
 }
 
-void LocalizationPipeline::add_fix(const RawFix& fix) {
-  if (last_odometry_ && to_seconds(fix.stamp - last_odometry_->stamp) > kMaxAhead_s) {
-    FixVerdict verdict;
-    verdict.stamp = fix.stamp;
-    verdict.decision = FixDecision::kRejectedStale;
-    verdict.reason = "more than " + seconds_text(kMaxAhead_s) + " ahead of the odometry";
-    decide(std::move(verdict));
-    return;
-  }
-  // A receiver that does not know where it is may not know the time either.
-  if (is_usable_position(fix)) is_new(fix_stamps_, fix.stamp, "fixes");  // validation judges the rest
-  if (!frame_) {
-    before_datum_.push_back(fix);
-    if (before_datum_.size() > kMaxWaitingFixes) before_datum_.pop_front();
-    if (const auto datum = datum_initializer_.add(fix)) {
-      use_datum(*datum, std::to_string(parameters_.datum.datum_fix_count) + " agreeing fixes");
-    }
-    return;
-  }
-  validate(fix);
-  process_fixes();
+void LocalizationPipeline::forget_odometry(double gap_s) {
+  event(Level::kWarn, "no odometry for " + seconds_text(gap_s) +
+                          (initialized() ? ": place unknown, starting anew from the fixes" : ""));
+  history_.clear();
+  ++epoch_;
+  start_.lose_place();
 }
 
-void LocalizationPipeline::validate(const RawFix& fix) {
-  ValidatedFix sane = validate_fix(fix, *frame_, last_fix_stamp_, parameters_.fix);
-  if (is_rejected(sane.verdict.decision)) {
-    decide(std::move(sane.verdict));
+void LocalizationPipeline::add_imu_yaw_rate(Stamp stamp, double yaw_rate_radps) {
+  if (!parameters_.imu.use_imu_yaw_rate || !is_usable_yaw_rate(yaw_rate_radps)) return;
+  if (is_far_ahead(stamp)) {
+    event(Level::kWarn,
+          "yaw rate of the IMU left out: more than " + seconds_text(kMaxAhead_s) + " ahead of the odometry");
     return;
   }
-  last_fix_stamp_ = fix.stamp;
-  if (pending_.size() >= kMaxWaitingFixes) pending_.pop_front();
-  pending_.push_back({sane.fix, std::move(sane.verdict)});
+  if (is_new(InputStream::kImu, stamp)) yaw_rate_.add(stamp, yaw_rate_radps);
 }
 
-void LocalizationPipeline::add_bias(const BiasEstimate& bias) {
-  biases_.push_back(bias);
-  if (biases_.size() > kMaxWaitingFixes) biases_.pop_front();
-  process_fixes();
+void LocalizationPipeline::add_velocity(const RawVelocity& velocity) {
+  if (!takes_velocity()) return;
+  std::string fault = velocity_fault(velocity);
+  if (fault.empty() && is_far_ahead(velocity.stamp)) {
+    fault = "more than " + seconds_text(kMaxAhead_s) + " ahead of the odometry";
+  }
+  if (fault.empty() && !is_new(InputStream::kVelocities, velocity.stamp)) fault = "not newer than the last";
+  if (!fault.empty()) {
+    event(Level::kWarn, "velocity of the receiver left out: " + fault);
+    return;
+  }
+  velocities_.add(velocity);
+  process_velocities();
+}
+
+void LocalizationPipeline::process_velocities() {
+  if (history_.empty()) return;
+  while (const auto velocity = velocities_.take(history_.latest())) process_velocity(*velocity);
+}
+
+void LocalizationPipeline::process_velocity(const RawVelocity& velocity) {
+  const auto matched = match_velocity(velocity, history_, antenna_);
+  if (!matched) {
+    event(Level::kWarn, "velocity of the receiver left out: older than the odometry that is remembered");
+    return;
+  }
+  start_.add_velocity(matched->pair);
+  if (!initialized()) return;
+  localizer_->correct_velocity(matched->measurement);
+  reporter_.count_velocity();
+  guard_against_non_finite();
 }
 
 void LocalizationPipeline::add_satellites(Stamp stamp, std::vector<SatelliteObservation> satellites) {
   if (!takes_satellites()) return;
-  if (last_taken_ && is_same_epoch(stamp, *last_taken_)) fixes_have_satellites_ = true;  // they came late
-  satellites_.emplace_back(stamp, std::move(satellites));
-  if (satellites_.size() > kMaxWaitingSatellites) satellites_.pop_front();
+  satellites_.add({stamp, std::move(satellites)});
   process_fixes();
 }
 
-const std::vector<SatelliteObservation>* LocalizationPipeline::satellites_of(Stamp stamp) const {
-  // From the back: of two of one stamp, those that came last.
-  const auto found = std::find_if(satellites_.rbegin(), satellites_.rend(),
-                                  [&](const auto& epoch) { return is_same_epoch(epoch.first, stamp); });
-  return found != satellites_.rend() ? &found->second : nullptr;
-}
-
-std::vector<SatelliteObservation> LocalizationPipeline::take_satellites_of(Stamp fix_stamp) {
-  const auto* satellites = satellites_of(fix_stamp);
-  fixes_have_satellites_ = satellites != nullptr;
-  last_taken_ = fix_stamp;
-  return satellites ? *satellites : std::vector<SatelliteObservation>{};
+void LocalizationPipeline::add_bias(const BiasEstimate& bias) {
+  biases_.add(bias);
+  process_fixes();
 }
 
 std::optional<BiasQuery> LocalizationPipeline::bias_query() const {
-  if (!initialized_ || !localizer_->wants_bias() || pending_.empty() || history_.empty()) return std::nullopt;
-  const PendingFix& next = pending_.front();
-  const auto predicted = predicted_antenna(next.fix.stamp);
+  const ValidatedFix* next = fixes_.next();
+  if (!initialized() || !localizer_->wants_bias() || next == nullptr || history_.empty()) return std::nullopt;
+  const auto predicted = predicted_antenna(next->fix.stamp);
   if (!predicted) return std::nullopt;
-  return BiasQuery{next.fix, next.validation, *predicted};
+  return BiasQuery{next->fix, next->verdict, *predicted};
 }
 
-std::optional<Eigen::Vector2d> LocalizationPipeline::predicted_antenna(Stamp stamp) const {
-  const auto motion = history_.motion_between(history_.latest(), stamp);
-  if (!motion) return std::nullopt;
-  return transform_point(compose(localizer_->pose(), *motion), antenna_offset());
-}
-
-Eigen::Vector2d LocalizationPipeline::antenna_offset() const {
-  return {parameters_.antenna_offset[0], parameters_.antenna_offset[1]};
+void LocalizationPipeline::add_fix(const RawFix& fix) {
+  if (is_far_ahead(fix.stamp)) {
+    FixVerdict verdict;
+    verdict.stamp = fix.stamp;
+    decide_stale(std::move(verdict), "more than " + seconds_text(kMaxAhead_s) + " ahead of the odometry");
+    return;
+  }
+  // A receiver that does not know where it is may not know the time either. What is not new, the validation rejects.
+  if (is_usable_position(fix)) is_new(InputStream::kFixes, fix.stamp);
+  fixes_.add(fix);
+  if (!frame()) {
+    datum_.add(fix);
+    if (frame()) event(Level::kInfo, datum_.describe());
+  }
+  process_fixes();
 }
 
 void LocalizationPipeline::process_fixes() {
+  if (!frame()) return;
+  for (FixVerdict& rejected : fixes_.validate(*frame())) decide(std::move(rejected));
   while (process_next_fix()) {
   }
 }
 
 bool LocalizationPipeline::process_next_fix() {
-  if (pending_.empty() || history_.empty()) return false;
-  const PendingFix next = pending_.front();
-  if (next.fix.stamp > history_.latest()) return false;
-  if (next.fix.stamp < history_.oldest()) {
-    pending_.pop_front();
-    FixVerdict verdict = next.validation;
-    verdict.decision = FixDecision::kRejectedStale;
-    verdict.reason = "older than the odometry that is remembered";
-    decide(std::move(verdict));
+  const ValidatedFix* next = fixes_.next();
+  if (next == nullptr || history_.empty() || next->fix.stamp > history_.latest()) return false;
+  const bool is_too_old = next->fix.stamp < history_.oldest();
+  if (!is_too_old && initialized() && awaits_more(next->fix.stamp)) return false;
+
+  const ValidatedFix fix = fixes_.pop();
+  if (is_too_old) {
+    decide_stale(fix.verdict, "older than the odometry that is remembered");
     return true;
   }
-  if (!initialized_) {
-    pending_.pop_front();
-    initialize_with(next);
+  if (!initialized()) {
+    start_with(fix);
     return true;
   }
-  if (fixes_have_satellites_ && !satellites_of(next.fix.stamp) &&
-      to_seconds(history_.latest() - next.fix.stamp) < parameters_.satellites_timeout) {
-    return false;
+  const std::optional<BiasEstimate> bias = take_bias(fix.fix.stamp);
+  if (restart_with(fix)) return true;
+  if (bias && is_rejected(bias->verdict.decision)) {
+    decide(bias->verdict);
+  } else {
+    correct_with(fix);
   }
-  if (localizer_->wants_bias()) {
-    while (!biases_.empty() && biases_.front().stamp < next.fix.stamp) biases_.pop_front();
-    // Searched for: a bias of before the clock was set back, published late, may stand in front for good.
-    const auto found = std::find_if(biases_.rbegin(), biases_.rend(),
-                                    [&](const BiasEstimate& bias) { return bias.stamp == next.fix.stamp; });
-    if (found != biases_.rend()) {
-      const BiasEstimate bias = *found;
-      last_radius_m_ = bias.radius_m;
-      pending_.pop_front();
-      if (restart_if_lost(next)) return true;
-      if (is_rejected(bias.verdict.decision)) {
-        decide(bias.verdict);
-      } else {
-        correct_with(next, bias.radius_m);
-      }
-      return true;
-    }
-    if (to_seconds(history_.latest() - next.fix.stamp) < parameters_.bias_timeout) return false;
-    event(PipelineEvent::Level::kWarn,
-          "no gps/bias for a fix within " + seconds_text(parameters_.bias_timeout) + ": the last radius is used");
-  }
-  pending_.pop_front();
-  if (!restart_if_lost(next)) correct_with(next, last_radius_m_);
   return true;
 }
 
-void LocalizationPipeline::correct_with(const PendingFix& pending, double radius_m) {
-  const auto motion = history_.motion_between(history_.latest(), pending.fix.stamp);
+bool LocalizationPipeline::awaits_more(Stamp fix) const {
+  const double waited_s = to_seconds(history_.latest() - fix);
+  return (satellites_.awaits(fix) && waited_s < parameters_.satellites.satellites_wait) ||
+         (localizer_->wants_bias() && biases_.awaits(fix, waited_s));
+}
+
+void LocalizationPipeline::start_with(const ValidatedFix& fix) {
+  satellites_.take(fix.fix.stamp);
+  const auto start = start_.find_start(with_odometry(fix.fix));
+  decide_unexamined(fix, "used for the start", start.has_value());
+  if (start) start_from(*start);
+}
+
+bool LocalizationPipeline::restart_with(const ValidatedFix& fix) {
+  const auto start = start_.find_restart(with_odometry(fix.fix), *predicted_antenna(fix.fix.stamp), events_);
+  if (!start) return false;
+  decide_unexamined(fix, start->fix_use, true);
+  start_from(*start);
+  return true;
+}
+
+std::optional<BiasEstimate> LocalizationPipeline::take_bias(Stamp fix) {
+  if (!localizer_->wants_bias()) return std::nullopt;
+  const std::optional<BiasEstimate> bias = biases_.take(fix);
+  if (!bias) {
+    event(Level::kWarn,
+          "no gps/bias for a fix within " + seconds_text(parameters_.bias.bias_timeout) + ": the last radius is used");
+  }
+  return bias;
+}
+
+void LocalizationPipeline::correct_with(const ValidatedFix& fix) {
+  const Stamp stamp = fix.fix.stamp;
   FixMeasurement measurement;
-  measurement.position = pending.fix.position;
-  measurement.covariance = pending.fix.covariance;
-  measurement.antenna_in_body = transform_point(*motion, antenna_offset());
-  measurement.bias_radius_m = radius_m;
-  measurement.time_s = to_seconds(pending.fix.stamp);
-  measurement.stamp = pending.fix.stamp;
-  measurement.satellites = take_satellites_of(pending.fix.stamp);
+  measurement.position = fix.fix.position;
+  measurement.covariance = fix.fix.covariance;
+  measurement.antenna_in_body = transform_point(*history_.motion_between(history_.latest(), stamp), antenna_);
+  measurement.bias_radius_m = biases_.radius_m();
+  measurement.time_s = to_seconds(stamp);
+  measurement.stamp = stamp;
+  if (const SatelliteEpoch* epoch = satellites_.take(stamp)) measurement.satellites = epoch->satellites;
+
   FixVerdict verdict = localizer_->correct(measurement);
-  verdict.stamp = pending.fix.stamp;
-  verdict.covariance_clamped = pending.validation.covariance_clamped;
-  if (verdict.decision == FixDecision::kAccepted) verdict.decision = pending.validation.decision;
-  if (verdict.reason.empty()) verdict.reason = pending.validation.reason;
+  verdict.stamp = stamp;
+  verdict.covariance_clamped = fix.verdict.covariance_clamped;
+  if (verdict.decision == FixDecision::kAccepted) verdict.decision = fix.verdict.decision;
+  if (verdict.reason.empty()) verdict.reason = fix.verdict.reason;
   decide(std::move(verdict));
   guard_against_non_finite();
 }
 
-void LocalizationPipeline::decide_unexamined(const PendingFix& pending, const char* reason) {
-  FixVerdict verdict = pending.validation;
+void LocalizationPipeline::decide_stale(FixVerdict verdict, const std::string& reason) {
+  verdict.decision = FixDecision::kRejectedStale;
+  verdict.reason = reason;
+  decide(std::move(verdict));
+}
+
+void LocalizationPipeline::decide_unexamined(const ValidatedFix& fix, const std::string& reason, bool is_start) {
+  FixVerdict verdict = fix.verdict;
   verdict.decision = FixDecision::kNotExamined;
   verdict.reason = reason;
-  last_verdict_ = verdict;
+  reporter_.note_start_fix(verdict, is_start);
   verdicts_.push_back(std::move(verdict));
 }
 
 void LocalizationPipeline::decide(FixVerdict verdict) {
-  if (is_rejected(verdict.decision)) {
-    ++fixes_rejected_;
-  } else {
-    ++fixes_used_;
-    if (verdict.of_ranges) ++fixes_with_ranges_;
-    last_used_ = verdict.stamp;
-  }
-  last_verdict_ = verdict;
+  reporter_.count(verdict);
   verdicts_.push_back(std::move(verdict));
+}
+
+void LocalizationPipeline::set_pose(const PoseEstimate& pose) {
+  start_.give(pose);
+  if (frame() && !history_.empty()) start_from({pose, "a pose that was set"});
+}
+
+void LocalizationPipeline::set_datum(const GeodeticPosition& datum) {
+  const bool had_frame = frame().has_value();
+  if (!datum_.set(datum)) return;
+  if (had_frame) {
+    reset("the datum was set to another place");
+    return;
+  }
+  event(Level::kInfo, datum_.describe());
+  process_fixes();
+}
+
+void LocalizationPipeline::start_from(const Start& start) {
+  localizer_->initialize(start.estimate);
+  start_.note(start);
+  biases_.forget_radius();
+  const Pose2& pose = start.estimate.pose;
+  std::ostringstream text;
+  text.precision(4);
+  text << "started from " << start.source << ": x " << pose.x << " m, y " << pose.y << " m, yaw " << pose.yaw << " rad";
+  event(Level::kInfo, text.str());
+}
+
+std::optional<Eigen::Vector2d> LocalizationPipeline::predicted_antenna(Stamp stamp) const {
+  const auto motion = history_.motion_between(history_.latest(), stamp);
+  if (!motion) return std::nullopt;
+  return transform_point(compose(localizer_->pose(), *motion), antenna_);
 }
 
 void LocalizationPipeline::guard_against_non_finite() {
   if (is_finite(localizer_->pose())) return;
-  event(PipelineEvent::Level::kError, "the estimate is not finite: starting anew from the fixes");
-  initialized_ = false;
-  lost_ = true;
-  forget_start();
+  event(Level::kError, "the estimate is not finite: starting anew from the fixes");
+  start_.lose_place();
 }
 
-void LocalizationPipeline::event(PipelineEvent::Level level, const std::string& text) {
-  events_.push_back({level, text});
+LocalizationReport LocalizationPipeline::report() const {
+  PipelineStatus status;
+  if (!history_.empty()) status.last_odometry = history_.latest();
+  status.last_fix = fixes_.last_stamp();
+  status.has_datum = frame().has_value();
+  status.has_started = initialized();
+  status.is_lost = start_.is_lost();
+  status.waiting_for = waiting_for();
+  status.bias_radius_m = biases_.radius_m();
+  return reporter_.report(status, *localizer_);
+}
+
+std::string LocalizationPipeline::waiting_for() const {
+  if (initialized()) return {};
+  if (history_.empty()) return "odometry";
+  if (!frame()) return "the datum: " + datum_.waiting_for();
+  if (!fixes_.last_stamp()) return "a usable fix";
+  return "the start: " + start_.waiting_for();
 }
 
 std::vector<LocalizationOutput> LocalizationPipeline::take_outputs() { return std::exchange(outputs_, {}); }

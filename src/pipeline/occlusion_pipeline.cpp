@@ -10,8 +10,6 @@
 namespace urban_gnss {
 namespace {
 
-constexpr std::size_t kMaxEpochs = 20;
-
 void append(std::string& text, const std::string& more) { text += (text.empty() ? "" : ", ") + more; }
 
 }  // namespace
@@ -86,24 +84,12 @@ void OcclusionPipeline::set_alignment(const WorldAlignment& alignment) {
 void OcclusionPipeline::set_satellites(Stamp stamp, std::vector<SatelliteObservation> satellites,
                                        double angle_resolution_rad) {
   const double resolution_rad = std::isfinite(angle_resolution_rad) ? std::max(0.0, angle_resolution_rad) : 0.0;
-  epochs_.push_back({stamp, std::move(satellites), resolution_rad});
-  if (epochs_.size() > kMaxEpochs) epochs_.pop_front();
-  if (last_fix_ == stamp) are_paired_ = true;  // they came late
+  epochs_.add({stamp, std::move(satellites), resolution_rad});
 }
 
-bool OcclusionPipeline::awaits_satellites(Stamp fix_stamp) const {
-  return are_paired_ && std::none_of(epochs_.begin(), epochs_.end(),
-                                     [&](const SatelliteEpoch& epoch) { return epoch.stamp == fix_stamp; });
-}
-
-const OcclusionPipeline::SatelliteEpoch* OcclusionPipeline::satellites_at(Stamp stamp) const {
-  const auto distance = [&](const SatelliteEpoch& epoch) { return std::abs(to_seconds(stamp - epoch.stamp)); };
-  // From the back: of two that are as near, the one that came last.
-  const auto nearest = std::min_element(epochs_.rbegin(), epochs_.rend(),
-                                        [&](const auto& a, const auto& b) { return distance(a) < distance(b); });
-  const bool is_there = nearest != epochs_.rend() && !nearest->satellites.empty() &&
-                        distance(*nearest) <= parameters_.occlusion.satellites_timeout;
-  return is_there ? &*nearest : nullptr;
+const SatelliteEpoch* OcclusionPipeline::satellites_for(Stamp fix) const {
+  const SatelliteEpoch* nearest = epochs_.nearest(fix, parameters_.occlusion.satellites_max_age);
+  return nearest != nullptr && !nearest->satellites.empty() ? nearest : nullptr;
 }
 
 const RayTracer& OcclusionPipeline::tracer() const {
@@ -161,9 +147,8 @@ FixAssessment OcclusionPipeline::assess(Stamp stamp, const std::optional<Eigen::
                                         const std::optional<Eigen::Isometry3d>& base_in_odom) {
   FixAssessment assessment;
   assessment.stamp = stamp;
-  const SatelliteEpoch* epoch = satellites_at(stamp);
-  last_fix_ = stamp;
-  are_paired_ = epoch != nullptr && epoch->stamp == stamp;
+  epochs_.take(stamp);
+  const SatelliteEpoch* epoch = satellites_for(stamp);
   if (epoch != nullptr) assessment.satellites = epoch->satellites;
   const auto antenna = antenna_at(stamp, base_in_odom, assessment.missing);
   if (epoch == nullptr) append(assessment.missing, "satellites");
@@ -203,9 +188,7 @@ void OcclusionPipeline::reset() {
   clear_map();
   covariance_.reset();
   alignment_.reset();
-  epochs_.clear();
-  last_fix_.reset();
-  are_paired_ = false;
+  epochs_.reset();
 }
 
 }  // namespace urban_gnss

@@ -42,7 +42,7 @@ LocalizerNode::LocalizerNode(ros::NodeHandle& node, ros::NodeHandle& private_nod
   if (pipeline_.takes_satellites()) {
     subscribers_.push_back(node.subscribe(topics::kSatellites, 100, &Self::on_satellites, this, kNoDelay));
   }
-  if (parameters_.localization.use_imu_yaw_rate) {
+  if (parameters_.localization.imu.use_imu_yaw_rate) {
     subscribers_.push_back(node.subscribe(topics::kImu, 1000, &Self::on_imu, this, kNoDelay));
   }
   services_.push_back(node.advertiseService("set_pose", &Self::set_pose, this));
@@ -51,8 +51,7 @@ LocalizerNode::LocalizerNode(ros::NodeHandle& node, ros::NodeHandle& private_nod
   services_.push_back(node.advertiseService("fromLL", &Self::from_ll, this));
   services_.push_back(private_node.advertiseService("reset", &Self::reset, this));
 
-  const Eigen::Vector2d offset(parameters_.localization.antenna_offset[0], parameters_.localization.antenna_offset[1]);
-  antenna_known_ = !parameters_.antenna_offset_from_tf || offset.norm() > 0.0;
+  antenna_known_ = !parameters_.antenna_offset_from_tf || parameters_.localization.input.antenna().norm() > 0.0;
   if (!antenna_known_) tf_listener_ = std::make_unique<tf2_ros::TransformListener>(tf_buffer_);
 
   diagnostics_.setHardwareID("none");

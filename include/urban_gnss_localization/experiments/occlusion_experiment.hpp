@@ -20,7 +20,7 @@ struct OcclusionExperimentConditions {
   OcclusionExperimentConditions() {
     occlusion.covariance.allow_smaller = true;
     ukf.outliers = OutlierPolicy::kNone;
-    localization.use_imu_yaw_rate = true;
+    localization.imu.use_imu_yaw_rate = true;
   }
 
   OcclusionPipelineParameters occlusion;  ///< model and antenna are replaced

@@ -9,6 +9,7 @@
 #include "urban_gnss_localization/gnss/fix.hpp"
 #include "urban_gnss_localization/gnss/fix_decision.hpp"
 #include "urban_gnss_localization/gnss/satellite.hpp"
+#include "urban_gnss_localization/localizers/bias_estimate.hpp"
 #include "urban_gnss_localization/motion/motion_model.hpp"
 
 namespace urban_gnss {
@@ -80,6 +81,11 @@ class Localizer {
 
   /// Whether it makes use of the satellites of a fix.
   virtual bool takes_satellites() const { return false; }
+
+  /// Whether it estimates the bias of the fixes itself.
+  virtual bool estimates_bias() const { return false; }
+  /// The biases that it found itself since the last call, one a fix; none where it does not estimate them.
+  virtual std::vector<BiasEstimate> take_bias_estimates() { return {}; }
 
   virtual Pose2 pose() const = 0;
   /// The pose with its covariance.

@@ -33,10 +33,11 @@ class SettingsWithMotion : public LocalizerSettings {
   MotionParameters motion_;
 };
 
-/// A localizer with some parameters set, under a name of its own in comparisons.
+/// How a localizer takes part in comparisons: with some parameters set, under a name of its own.
 struct LocalizerVariant {
   std::string name;                      ///< "gated_ekf"
   std::vector<std::string> assignments;  ///< "mode=gated", as --set takes them
+  bool with_occlusion{false};            ///< also behind the occlusion node
 };
 
 /// What nodes, replay, experiments, reports, launch files and documents know of a localizer.

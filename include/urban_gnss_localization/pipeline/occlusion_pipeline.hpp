@@ -1,7 +1,6 @@
 #pragma once
 
 #include <Eigen/Geometry>
-#include <deque>
 #include <limits>
 #include <memory>
 #include <optional>
@@ -15,6 +14,7 @@
 #include "urban_gnss_localization/occlusion/local_map.hpp"
 #include "urban_gnss_localization/occlusion/visibility.hpp"
 #include "urban_gnss_localization/occlusion/voxel_ray_tracer.hpp"
+#include "urban_gnss_localization/pipeline/epoch_matcher.hpp"
 #include "urban_gnss_localization/pipeline/map_consistency.hpp"
 
 namespace urban_gnss {
@@ -31,19 +31,20 @@ struct OcclusionParameters {
   double antenna_sigma{0.3};
   double heading_sigma{0.05};
   double heading_timeout{5.0};
-  double satellites_timeout{2.0};
+  double satellites_max_age{2.0};
   double map_timeout{60.0};
   int sky_azimuths{72};
   double sky_mask{0.17};
 
   void visit(ParameterVisitor& v) {
     v.basic()("tracer", tracer, "voxel, or kdtree: Algorithm 2 as printed, slow");
-    v.basic()("antenna_offset", antenna_offset, "m", "antenna in base_link_frame; zeros: from tf, by the fix's frame_id");
+    v.basic()("antenna_offset", antenna_offset, "m",
+              "antenna in base_link_frame; zeros: from tf, by the fix's frame_id");
     v("antenna_sigma", antenna_sigma, non_negative(), "",
       "m per horizontal axis: how well the antenna is placed in the map");
     v("heading_sigma", heading_sigma, non_negative(), "rad", "at least that much is not known of the heading");
     v("heading_timeout", heading_timeout, positive(), "s", "an older heading is not used");
-    v("satellites_timeout", satellites_timeout, positive(), "s", "older satellites are not used for a fix");
+    v("satellites_max_age", satellites_max_age, positive(), "s", "older satellites are not used for a fix");
     v("map_timeout", map_timeout, positive(), "s", "without a cloud after which the map is no longer believed");
     v("sky_azimuths", sky_azimuths, between(8, 720), "",
       "directions of the skyline, where there are no satellites and for the sky plot");
@@ -128,9 +129,8 @@ class OcclusionPipeline {
   /// Angles that are not finite are left out. `angle_resolution_rad`: step that the receiver rounds to; 0 if unknown.
   /// The latest ones are kept: a fix is weighed by those that are nearest to it in time.
   void set_satellites(Stamp stamp, std::vector<SatelliteObservation> satellites, double angle_resolution_rad);
-  /// Whether the satellites of a fix with this stamp are still to come, by what came to the fix before it: satellites
-  /// of the fix's own stamp.
-  bool awaits_satellites(Stamp fix_stamp) const;
+  /// Whether the satellites of a fix with this stamp are still to come, by what came to the fix before it.
+  bool awaits_satellites(Stamp fix_stamp) const { return epochs_.awaits(fix_stamp); }
 
   /// A fix with the covariance that its receiver claims (m^2, east and north), and the robot's pose in the odometry
   /// frame at its stamp, where that is known.
@@ -151,13 +151,8 @@ class OcclusionPipeline {
   std::optional<AntennaPose> antenna_at(Stamp stamp, const std::optional<Eigen::Isometry3d>& base_in_odom,
                                         std::string& missing) const;
   SkyObservation observe_sky(const AntennaPose& antenna) const;
-  struct SatelliteEpoch {
-    Stamp stamp{0};
-    std::vector<SatelliteObservation> satellites;
-    double angle_resolution_rad{0.0};
-  };
-  /// Nothing where they are too old.
-  const SatelliteEpoch* satellites_at(Stamp stamp) const;
+  /// The satellites that a fix is weighed by; null where there are none, or they are too old.
+  const SatelliteEpoch* satellites_for(Stamp fix) const;
 
   OcclusionPipelineParameters parameters_;
   LocalMap local_map_;
@@ -170,9 +165,7 @@ class OcclusionPipeline {
   std::optional<Stamp> last_cloud_;
   std::optional<WorldAlignment> alignment_;
   bool has_prior_{false};
-  std::deque<SatelliteEpoch> epochs_;  ///< the latest, as they came
-  std::optional<Stamp> last_fix_;
-  bool are_paired_{false};  ///< the last fix had satellites of its own stamp
+  EpochMatcher epochs_;
 };
 
 }  // namespace urban_gnss

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <optional>
-#include <string>
 
 #include "urban_gnss_localization/common/stamp.hpp"
 
@@ -31,13 +30,6 @@ class StampMonitor {
  private:
   Stamp jump_;
   std::optional<Stamp> last_;
-};
-
-/// Something that happened and that people should hear of once.
-struct PipelineEvent {
-  enum class Level { kInfo, kWarn, kError };
-  Level level{Level::kInfo};
-  std::string text;
 };
 
 }  // namespace urban_gnss

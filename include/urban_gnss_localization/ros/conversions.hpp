@@ -19,7 +19,7 @@
 #include <vector>
 
 #include "urban_gnss_localization/evaluation/trajectory.hpp"
-#include "urban_gnss_localization/localizers/nishida/bias_kalman_filter.hpp"
+#include "urban_gnss_localization/localizers/bias_estimate.hpp"
 #include "urban_gnss_localization/localizers/particle_set.hpp"
 #include "urban_gnss_localization/pipeline/localization_pipeline.hpp"
 

@@ -61,6 +61,7 @@ class LocalizerNode {
                 std::unique_ptr<Localizer> localizer, OutputHook on_output = {});
 
   const LocalizerNodeParameters& parameters() const { return parameters_; }
+  LocalizationPipeline& pipeline() { return pipeline_; }
 
  private:
   void on_odometry(const nav_msgs::Odometry& message);

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "urban_gnss_localization/localizers/nishida/bias_kalman_filter.hpp"
 #include "urban_gnss_localization/geometry/pose2.hpp"
+#include "urban_gnss_localization/localizers/bias_estimate.hpp"
 
 namespace urban_gnss {
 

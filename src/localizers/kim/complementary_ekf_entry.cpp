@@ -19,7 +19,7 @@ LocalizerEntry complementary_ekf_entry() {
   return {"complementary_ekf",
           "Kim et al.: a complementary EKF whose bias filter opens where the fixes contradict the odometry.",
           std::make_unique<ComplementaryEkfSettings>,
-          {{"ekf", {"mode=standard"}}, {"gated_ekf", {"mode=gated"}}}};
+          {{"ekf", {"mode=standard"}}, {"gated_ekf", {"mode=gated"}}, {"complementary_ekf", {"mode=compensated"}}}};
 }
 
 }  // namespace urban_gnss

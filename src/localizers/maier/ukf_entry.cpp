@@ -7,7 +7,7 @@ LocalizerEntry ukf_entry() {
   return {"ukf",
           "Maier and Kleiner: an unscented Kalman filter, behind occlusion_node or on its own.",
           std::make_unique<SettingsWithMotion<Ukf, UkfParameters>>,
-          {}};
+          {{"ukf", {}, true}}};
 }
 
 }  // namespace urban_gnss

@@ -7,7 +7,7 @@ LocalizerEntry particle_filter_entry() {
   return {"particle_filter",
           "Nishida et al.: a particle filter that uses the length of the bias, which gps_bias_node tracks.",
           std::make_unique<SettingsWithMotion<ParticleFilter, ParticleFilterParameters>>,
-          {{"paper", {"mode=paper"}}, {"literal", {"mode=literal"}}, {"conventional", {"mode=conventional"}}}};
+          {{"paper", {"mode=paper"}}}};
 }
 
 }  // namespace urban_gnss

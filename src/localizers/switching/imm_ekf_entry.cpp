@@ -7,7 +7,7 @@ LocalizerEntry imm_ekf_entry() {
   return {"imm_ekf",
           "Our own: interacting multiple models of a bias that comes and goes; the odometry's errors are states.",
           std::make_unique<SettingsWithMotion<ImmEkf, ImmEkfParameters>>,
-          {}};
+          {{"imm_ekf", {}, true}}};
 }
 
 }  // namespace urban_gnss

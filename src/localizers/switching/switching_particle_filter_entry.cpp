@@ -7,7 +7,7 @@ LocalizerEntry switching_particle_filter_entry() {
   return {"switching_particle_filter",
           "The model of imm_ekf with particles, for a start whose heading is unknown.",
           std::make_unique<SettingsWithMotion<SwitchingParticleFilter, SwitchingParticleFilterParameters>>,
-          {{"switching", {}}}};
+          {{"switching", {}, true}}};
 }
 
 }  // namespace urban_gnss

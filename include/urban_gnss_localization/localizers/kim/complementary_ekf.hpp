@@ -4,11 +4,11 @@
 #include <vector>
 
 #include "urban_gnss_localization/gnss/heading_initializer.hpp"
+#include "urban_gnss_localization/localizers/bias_estimate.hpp"
 #include "urban_gnss_localization/localizers/kim/bias_detector.hpp"
 #include "urban_gnss_localization/localizers/kim/fix_noise_monitor.hpp"
 #include "urban_gnss_localization/localizers/kim/two_stage_filter.hpp"
 #include "urban_gnss_localization/localizers/localizer.hpp"
-#include "urban_gnss_localization/localizers/nishida/bias_kalman_filter.hpp"
 #include "urban_gnss_localization/motion/dead_reckoning.hpp"
 #include "urban_gnss_localization/motion/standstill.hpp"
 
@@ -103,6 +103,7 @@ class ComplementaryEkf : public Localizer {
   const char* name() const override { return "complementary_ekf"; }
   std::string mode() const override { return enum_name(parameters_.mode); }
   bool wants_bias() const override { return false; }
+  bool estimates_bias() const override { return true; }
   void initialize(const PoseEstimate& start) override;
   void move(const Twist2& twist, double duration_s) override;
   FixVerdict correct(const FixMeasurement& fix) override;
@@ -128,8 +129,7 @@ class ComplementaryEkf : public Localizer {
   /// smallest_detectable_jump (m) at the last fix; 0 before the first.
   double smallest_detectable_jump_m() const;
 
-  /// One for every fix since the last call, as gps/bias says it.
-  std::vector<BiasEstimate> take_bias_estimates();
+  std::vector<BiasEstimate> take_bias_estimates() override;
 
  private:
   using Filter = TwoStageFilter<kErrorStates, 2, 2>;

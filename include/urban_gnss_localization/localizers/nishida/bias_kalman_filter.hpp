@@ -5,6 +5,7 @@
 #include "urban_gnss_localization/common/parameters.hpp"
 #include "urban_gnss_localization/gnss/fix.hpp"
 #include "urban_gnss_localization/gnss/fix_decision.hpp"
+#include "urban_gnss_localization/localizers/bias_estimate.hpp"
 
 namespace urban_gnss {
 
@@ -65,21 +66,6 @@ struct GpsBiasParameters {
     v("shadow_probability", shadow_probability, between(0.5, 0.999999), "",
       "confidence at which the bias counts as significant: in_shadow");
   }
-};
-
-/// The bias as it stands after a fix.
-struct BiasEstimate {
-  Stamp stamp{0};
-  Eigen::Vector2d bias{Eigen::Vector2d::Zero()};        ///< m, fix minus antenna
-  Eigen::Vector2d rate{Eigen::Vector2d::Zero()};        ///< m/s
-  Eigen::Matrix2d covariance{Eigen::Matrix2d::Zero()};  ///< m^2
-  double radius_m{0.0};                                 ///< r-hat, eq. (21)
-  bool in_shadow{false};
-  double shadow_statistic{0.0};                                         ///< squared Mahalanobis length of the bias
-  double shadow_threshold{0.0};                                         ///< its chi-square quantile
-  Eigen::Vector2d fix_position{Eigen::Vector2d::Zero()};                ///< m, map frame
-  Eigen::Vector2d predicted_antenna_position{Eigen::Vector2d::Zero()};  ///< m, what the fix was compared with
-  FixVerdict verdict;
 };
 
 /// Tracks the bias from fix to fix: the Kalman filter above with its start, its gate and the way out of a lock-out.

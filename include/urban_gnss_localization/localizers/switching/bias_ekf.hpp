@@ -30,10 +30,10 @@ struct SwitchingModelParameters {
 
   void visit(ParameterVisitor& v) {
     v.include(fix);
-    v.group("noise", noise, "What the covariance is worth that a receiver declares.");
+    v.group("fix_noise", noise, "What the covariance is worth that a receiver declares.");
     v.group("ranges", ranges,
             "The ranges of a fix (gps/satellites): it is solved anew, each range in line of sight or reflected.");
-    v.group("velocity", velocity, "What the velocity of a receiver (gps/velocity) is worth.");
+    v.group("velocity_noise", velocity, "What the velocity of a receiver (gps/velocity) is worth.");
     v.group("bias", modes,
             "The bias of a fix: it is received directly, or has a bias that changes slowly, fast, or at once.");
     v.group("odometry", odometry, "The odometry's own errors, which the filter estimates.");

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <deque>
+#include <optional>
+
+#include "urban_gnss_localization/common/parameters.hpp"
+#include "urban_gnss_localization/localizers/bias_estimate.hpp"
+
+namespace urban_gnss {
+
+/// How a fix waits for its bias.
+struct BiasMatcherParameters {
+  double bias_timeout{0.5};
+
+  void visit(ParameterVisitor& v) {
+    v("bias_timeout", bias_timeout, non_negative(), "s",
+      "of odometry that a fix waits for its gps/bias; then the radius of the last one is used");
+  }
+};
+
+/// Pairs fixes with the biases that a bias filter found for them: the stamps are equal.
+class BiasMatcher {
+ public:
+  /// Requires parameters without faults.
+  explicit BiasMatcher(const BiasMatcherParameters& parameters) : parameters_(parameters) {}
+
+  void add(const BiasEstimate& bias);
+
+  /// Whether the bias of a fix is still worth waiting for, `waited_s` of odometry after it.
+  bool awaits(Stamp fix, double waited_s) const;
+
+  /// The bias of a fix, as its turn has come; nothing where it did not come in time.
+  std::optional<BiasEstimate> take(Stamp fix);
+
+  /// Radius (m) of the bias that was taken last; 0 before the first.
+  double radius_m() const { return radius_m_; }
+  void forget_radius() { radius_m_ = 0.0; }
+
+  void reset() { *this = BiasMatcher(parameters_); }
+
+ private:
+  const BiasEstimate* find(Stamp fix) const;
+
+  BiasMatcherParameters parameters_;
+  std::deque<BiasEstimate> biases_;
+  double radius_m_{0.0};
+};
+
+}  // namespace urban_gnss

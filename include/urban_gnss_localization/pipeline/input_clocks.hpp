@@ -1,0 +1,50 @@
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "urban_gnss_localization/common/parameters.hpp"
+#include "urban_gnss_localization/pipeline/stamp_monitor.hpp"
+
+namespace urban_gnss {
+
+/// What the stamps of the messages tell.
+struct StampParameters {
+  double odometry_gap{2.0};
+  double time_jump{1.0};
+  bool reset_on_time_jump{true};
+
+  void visit(ParameterVisitor& v) {
+    v("odometry_gap", odometry_gap, positive(), "s",
+      "without odometry after which the robot's place is unknown: localizer and bias filter start anew");
+    v("time_jump", time_jump, positive(), "s",
+      "by which a stamp must be older than the last for its clock to have been set back");
+    v("reset_on_time_jump", reset_on_time_jump,
+      "whether to start anew where a clock was set back, e.g. in a bag that is played in a loop");
+  }
+};
+
+enum class InputStream { kOdometry, kFixes, kImu, kVelocities, kEstimates };
+/// As an event names it.
+const char* to_string(InputStream stream);
+
+/// The clocks of a pipeline's inputs, one a stream. Stamps ascend in each; where one clock was set back, all are taken
+/// to have been.
+class InputClocks {
+ public:
+  /// Requires parameters without faults.
+  explicit InputClocks(const StampParameters& parameters);
+
+  /// Whether a message with this stamp is to be used: it is newer than the last of its stream, or the first after its
+  /// clock was set back. In the latter case `reset` is called before, with the reason.
+  bool accept(InputStream stream, Stamp stamp, const std::function<void(const std::string& why)>& reset);
+
+  void reset();
+
+ private:
+  bool reset_on_time_jump_;
+  std::vector<StampMonitor> monitors_;
+};
+
+}  // namespace urban_gnss

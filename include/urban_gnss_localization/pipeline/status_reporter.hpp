@@ -1,0 +1,96 @@
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <string>
+
+#include "urban_gnss_localization/common/parameters.hpp"
+#include "urban_gnss_localization/gnss/fix_decision.hpp"
+#include "urban_gnss_localization/localizers/localizer.hpp"
+
+namespace urban_gnss {
+
+/// When a localizer is said to be well.
+struct StatusParameters {
+  double fix_timeout{10.0};
+  double heading_converged_sigma{0.3};
+
+  void visit(ParameterVisitor& v) {
+    v("fix_timeout", fix_timeout, positive(), "s", "without a fix that was used after which this is dead reckoning");
+    v("heading_converged_sigma", heading_converged_sigma, positive(), "rad",
+      "standard deviation of the heading below which it is said to be known (~status, healthy)");
+  }
+};
+
+/// The states of LocalizationStatus.msg.
+enum class LocalizationState : std::uint8_t {
+  kWaitingForOdometry = 0,
+  kWaitingForFix = 1,
+  kWaitingForDatum = 2,
+  kInitializing = 3,
+  kTracking = 4,
+  kDeadReckoning = 5,
+  kLost = 6,
+};
+const char* to_string(LocalizationState state);
+
+/// What LocalizationStatus.msg says.
+struct LocalizationReport {
+  LocalizationState state{LocalizationState::kWaitingForOdometry};
+  bool healthy{false};
+  std::string reason;
+  FixVerdict last_fix;
+  std::uint64_t fixes_used{0};
+  std::uint64_t fixes_rejected{0};
+  std::uint64_t fixes_with_ranges{0};  ///< of those used, with FixVerdict::of_ranges
+  std::uint64_t velocities_used{0};    ///< of the receiver
+  double fix_age_s{std::numeric_limits<double>::quiet_NaN()};
+  double odometry_age_s{0.0};
+  double position_sigma_m{std::numeric_limits<double>::quiet_NaN()};
+  bool heading_converged{false};
+  double bias_radius_m{0.0};
+  LocalizerHealth health;
+};
+
+/// How a pipeline stands.
+struct PipelineStatus {
+  std::optional<Stamp> last_odometry;
+  std::optional<Stamp> last_fix;  ///< that was validated
+  bool has_datum{false};
+  bool has_started{false};
+  bool is_lost{false};
+  std::string waiting_for;    ///< empty where it waits for nothing
+  double bias_radius_m{0.0};  ///< of the last gps/bias
+};
+
+/// Counts what was decided, and says how a pipeline and its localizer are.
+class StatusReporter {
+ public:
+  /// `odometry_gap_s`: without odometry for longer than this, the localizer is not well. Requires parameters without
+  /// faults.
+  StatusReporter(const StatusParameters& parameters, double odometry_gap_s)
+      : parameters_(parameters), odometry_gap_s_(odometry_gap_s) {}
+
+  /// A fix was used or rejected.
+  void count(const FixVerdict& verdict);
+  /// A fix was not examined, as it went into the start; `is_start`: the localizer started with it.
+  void note_start_fix(const FixVerdict& verdict, bool is_start);
+  void count_velocity() { ++counts_.velocities_used; }
+
+  LocalizationReport report(const PipelineStatus& status, const Localizer& localizer) const;
+
+  void reset() { *this = StatusReporter(parameters_, odometry_gap_s_); }
+
+ private:
+  void judge(const PipelineStatus& status, LocalizationReport& report) const;
+  /// Why the localizer is not well; empty where it is.
+  std::string complaint(const PipelineStatus& status, const LocalizationReport& report) const;
+
+  StatusParameters parameters_;
+  double odometry_gap_s_;
+  LocalizationReport counts_;  ///< of which the last fix and the counts are used
+  std::optional<Stamp> last_used_;
+};
+
+}  // namespace urban_gnss

@@ -1,0 +1,124 @@
+#include "urban_gnss_localization/pipeline/start_supervisor.hpp"
+
+#include <cmath>
+#include <stdexcept>
+#include <utility>
+
+#include "text.hpp"
+
+namespace urban_gnss {
+namespace {
+
+constexpr double kFarSigmas = 3.0;
+/// Fixes closer together than this share their error: for the start they count as one.
+constexpr double kStartFixInterval_s = 1.0;
+
+}  // namespace
+
+void StartParameters::check(std::vector<std::string>& faults) const {
+  if (initial_pose.empty() || initial_pose.size() == 3) return;
+  faults.push_back("initial_pose: has " + std::to_string(initial_pose.size()) +
+                   " numbers; must be x, y (m) and yaw (rad), or empty");
+}
+
+StartSupervisor::StartSupervisor(const StartParameters& parameters)
+    : parameters_(parameters), heading_(parameters.heading) {
+  const std::vector<double>& pose = parameters.initial_pose;
+  if (pose.size() != 3) return;
+  const double p2 = parameters.initial_position_sigma * parameters.initial_position_sigma;
+  const double h2 = parameters.initial_heading_sigma * parameters.initial_heading_sigma;
+  given_.emplace();
+  given_->pose = {pose[0], pose[1], wrap_angle(pose[2])};
+  given_->covariance = Eigen::Vector3d(p2, p2, h2).asDiagonal();
+}
+
+void StartSupervisor::give(const PoseEstimate& pose) {
+  if (!is_finite(pose.pose) || !pose.covariance.allFinite()) {
+    throw std::invalid_argument("pose or covariance is not finite");
+  }
+  given_ = pose;
+}
+
+bool StartSupervisor::remember(const StartFix& fix) {
+  if (last_remembered_ && to_seconds(fix.fix.stamp - *last_remembered_) < kStartFixInterval_s) return false;
+  last_remembered_ = fix.fix.stamp;
+  const Pose2 antenna{fix.antenna.x(), fix.antenna.y(), 0.0};
+  heading_.add(compose(*fix.history.pose_at(fix.fix.stamp), antenna), fix.fix);
+  return true;
+}
+
+std::optional<Start> StartSupervisor::find_start(const StartFix& fix) {
+  if (!remember(fix)) return std::nullopt;
+  if (auto start = from_motion(fix)) return start;
+  if (!heading_.timed_out()) return std::nullopt;
+  Start start = at_latest_odometry(heading_.without_heading(), fix);
+  start.source = "fixes, heading unknown";
+  start.has_heading = false;
+  return start;
+}
+
+std::optional<Start> StartSupervisor::find_restart(const StartFix& fix, const Eigen::Vector2d& predicted,
+                                                   std::vector<PipelineEvent>& events) {
+  const bool is_remembered = remember(fix);
+  std::optional<Start> start;
+  if (heading_is_unknown_ && is_remembered) start = from_motion(fix);
+  if (start) {
+    start->fix_use = "used for a start with heading";
+    return start;
+  }
+  if (is_lost_by(fix.fix, predicted, events) && is_remembered) start = from_motion(fix);
+  if (start) start->fix_use = "used for a new start";
+  return start;
+}
+
+std::optional<Start> StartSupervisor::from_motion(const StartFix& fix) const {
+  const auto found = heading_.estimate();
+  return found ? std::optional<Start>(at_latest_odometry(*found, fix)) : std::nullopt;
+}
+
+Start StartSupervisor::at_latest_odometry(PoseEstimate antenna, const StartFix& fix) {
+  // The mean of the fixes is no better than their common error, which their scatter does not show.
+  antenna.covariance.topLeftCorner<2, 2>() += fix.fix.covariance;
+  const Pose2 since = *fix.history.motion_between(fix.fix.stamp, fix.history.latest());
+  antenna.pose = compose(compose(antenna.pose, inverse(Pose2{fix.antenna.x(), fix.antenna.y(), 0.0})), since);
+  Start start;
+  start.estimate = antenna;
+  start.source = "fixes and motion";
+  return start;
+}
+
+bool StartSupervisor::is_lost_by(const LocalFix& fix, const Eigen::Vector2d& predicted,
+                                 std::vector<PipelineEvent>& events) {
+  const double sigma = std::sqrt(fix.covariance.trace());  // of the distance, as the receiver declares it
+  if ((fix.position - predicted).norm() <= parameters_.max_bias_radius + kFarSigmas * sigma) {
+    far_since_.reset();
+    is_lost_ = false;
+    return false;
+  }
+  if (!far_since_) far_since_ = fix.stamp;
+  if (to_seconds(fix.stamp - *far_since_) < parameters_.lost_timeout) return false;
+  if (!is_lost_) {
+    events.push_back(
+        {PipelineEvent::Level::kWarn,
+         "lost: every fix of the last " + seconds_text(parameters_.lost_timeout) + " is farther than max_bias_radius"});
+  }
+  is_lost_ = true;
+  return true;
+}
+
+void StartSupervisor::note(const Start& start) {
+  has_started_ = true;
+  heading_is_unknown_ = !start.has_heading;
+  is_lost_ = false;
+  far_since_.reset();
+  given_.reset();
+}
+
+void StartSupervisor::lose_place() {
+  is_lost_ = is_lost_ || has_started_;
+  has_started_ = false;
+  heading_.reset();
+  last_remembered_.reset();
+}
+
+}  // namespace urban_gnss

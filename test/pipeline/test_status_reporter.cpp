@@ -1,0 +1,103 @@
+#include "pipeline_rig.hpp"
+#include "urban_gnss_localization/pipeline/status_reporter.hpp"
+
+namespace urban_gnss {
+namespace {
+
+FixVerdict verdict(FixDecision decision, double time, bool of_ranges = false) {
+  FixVerdict verdict;
+  verdict.decision = decision;
+  verdict.stamp = from_seconds(time);
+  verdict.of_ranges = of_ranges;
+  return verdict;
+}
+
+/// A localizer that is well, ten seconds after its start, with a fix just now.
+struct Well {
+  StatusReporter reporter{StatusParameters{}, 2.0};
+  PipelineStatus status;
+  FakeLocalizer localizer;
+
+  Well() {
+    localizer.initialize(pose_with_sigma({}, 0.5, 0.1));
+    status.last_odometry = status.last_fix = from_seconds(110.0);
+    status.has_datum = status.has_started = true;
+    reporter.count(verdict(FixDecision::kAccepted, 110.0));
+  }
+  LocalizationReport report() const { return reporter.report(status, localizer); }
+};
+
+TEST(StatusReporter, CountsWhatBecameOfTheFixes) {
+  StatusReporter reporter({}, 2.0);
+  reporter.note_start_fix(verdict(FixDecision::kNotExamined, 1.0), false);
+  EXPECT_EQ(reporter.report({}, FakeLocalizer()).last_fix.stamp, from_seconds(1.0));
+  reporter.count(verdict(FixDecision::kAccepted, 2.0));
+  reporter.count(verdict(FixDecision::kInflated, 3.0, true));
+  reporter.count(verdict(FixDecision::kRejectedGate, 4.0, true));
+  reporter.count_velocity();
+  const LocalizationReport report = reporter.report({}, FakeLocalizer());
+  EXPECT_EQ(report.fixes_used, 2u);
+  EXPECT_EQ(report.fixes_with_ranges, 1u);
+  EXPECT_EQ(report.fixes_rejected, 1u);
+  EXPECT_EQ(report.velocities_used, 1u);
+  EXPECT_EQ(report.last_fix.decision, FixDecision::kRejectedGate);
+  reporter.reset();
+  EXPECT_EQ(reporter.report({}, FakeLocalizer()).fixes_used, 0u);
+}
+
+TEST(StatusReporter, FixAgeIsThatOfTheLastOneUsed) {
+  Well well;
+  const auto age_s = [&] { return well.report().fix_age_s; };
+  well.status.last_odometry = from_seconds(113.0);
+  EXPECT_NEAR(age_s(), 3.0, 1e-9);
+  well.reporter.count(verdict(FixDecision::kRejectedGate, 112.0));
+  well.reporter.note_start_fix(verdict(FixDecision::kNotExamined, 112.0), false);
+  EXPECT_NEAR(age_s(), 3.0, 1e-9);
+  well.reporter.note_start_fix(verdict(FixDecision::kNotExamined, 112.0), true);
+  EXPECT_NEAR(age_s(), 1.0, 1e-9);
+}
+
+TEST(StatusReporter, BeforeTheStartTheStateIsWhatIsMissing) {
+  PipelineStatus status;
+  status.waiting_for = "something";
+  const StatusReporter reporter({}, 2.0);
+  const auto state = [&] { return reporter.report(status, FakeLocalizer()).state; };
+  EXPECT_EQ(state(), LocalizationState::kWaitingForOdometry);
+  status.last_odometry = from_seconds(1.0);
+  EXPECT_EQ(state(), LocalizationState::kWaitingForDatum);
+  status.has_datum = true;
+  EXPECT_EQ(state(), LocalizationState::kWaitingForFix);
+  status.last_fix = from_seconds(1.0);
+  EXPECT_EQ(state(), LocalizationState::kInitializing);
+  status.is_lost = true;
+  EXPECT_EQ(state(), LocalizationState::kLost);
+  EXPECT_EQ(reporter.report(status, FakeLocalizer()).reason, "waiting for something");
+}
+
+TEST(StatusReporter, HealthNamesWhatIsWrongFirst) {
+  Well well;
+  EXPECT_TRUE(well.report().healthy) << well.report().reason;
+  EXPECT_EQ(well.report().state, LocalizationState::kTracking);
+  EXPECT_NEAR(well.report().position_sigma_m, 0.5, 1e-12);
+  const auto expect_complaint = [&](const std::string& text) {
+    const LocalizationReport report = well.report();
+    EXPECT_FALSE(report.healthy);
+    EXPECT_NE(report.reason.find(text), std::string::npos) << report.reason;
+  };
+  well.localizer.state.covariance(2, 2) = 0.16;
+  expect_complaint("heading not known");
+  well.status.last_fix = from_seconds(112.5);
+  expect_complaint("no odometry for 2.5 s");
+  well.status.last_odometry = from_seconds(120.5);
+  expect_complaint("no fix was used for 10.5 s");
+  EXPECT_EQ(well.report().state, LocalizationState::kDeadReckoning);
+  well.status.is_lost = true;
+  expect_complaint("max_bias_radius");
+  EXPECT_EQ(well.report().state, LocalizationState::kLost);
+  well.status.is_lost = false;
+  well.reporter.reset();
+  expect_complaint("no fix was used yet");
+}
+
+}  // namespace
+}  // namespace urban_gnss

@@ -1,0 +1,88 @@
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "urban_gnss_localization/pipeline/yaw_rate_source.hpp"
+
+namespace urban_gnss {
+namespace {
+
+/// Odometry at 10 Hz that says 0.1 rad/s.
+struct Steps {
+  YawRateSource source;
+  std::vector<PipelineEvent> events;
+  double time{0.0};
+
+  explicit Steps(bool use = true) : source({use}, 2.0) {}
+  void imu(double at, double rate) { source.add(from_seconds(at), rate); }
+  double step() {
+    const Stamp since = from_seconds(time);
+    time += 0.1;
+    return source.twist_of({from_seconds(time), {}, {2.0, 0.1}}, since, events).yaw_rate_radps;
+  }
+};
+
+TEST(YawRateSource, StepHasTheMeanOfTheRatesWithinIt) {
+  Steps steps;
+  steps.imu(0.0, 9.0);  // ends the step before
+  steps.imu(0.02, 0.4);
+  steps.imu(0.1, 0.6);
+  steps.imu(0.12, 5.0);
+  EXPECT_NEAR(steps.step(), 0.5, 1e-12);
+  EXPECT_NEAR(steps.step(), 5.0, 1e-12);
+  EXPECT_NEAR(steps.step(), 5.0, 1e-12) << "held";
+  EXPECT_NEAR(steps.step(), 5.0, 1e-12) << "0.18 s before the step";
+  EXPECT_NEAR(steps.step(), 0.1, 1e-12) << "0.28 s before it: the odometry's";
+}
+
+TEST(YawRateSource, OneThatIsNotWantedIsNotLookedAt) {
+  Steps steps(false);
+  steps.imu(0.05, 0.4);
+  EXPECT_EQ(steps.step(), 0.1);
+  EXPECT_TRUE(steps.events.empty());
+}
+
+TEST(YawRateSource, ChangesOfTheSourceAreTold) {
+  Steps steps;
+  for (int k = 0; k < 10; ++k) steps.step();
+  EXPECT_TRUE(steps.events.empty()) << "there never was one";
+  steps.imu(steps.time + 0.05, 0.3);
+  steps.step();
+  ASSERT_EQ(steps.events.size(), 1u);
+  EXPECT_EQ(steps.events[0].level, PipelineEvent::Level::kInfo);
+  for (int k = 0; k < 22; ++k) steps.step();  // held for two steps, silent for two seconds
+  EXPECT_EQ(steps.events.size(), 1u);
+  for (int k = 0; k < 50; ++k) steps.step();
+  ASSERT_EQ(steps.events.size(), 2u);
+  EXPECT_EQ(steps.events[1].level, PipelineEvent::Level::kWarn);
+  EXPECT_NE(steps.events[1].text.find("silent for 2 s"), std::string::npos) << steps.events[1].text;
+}
+
+TEST(YawRateSource, ResetForgetsRatesAndWhatWasFound) {
+  Steps steps;
+  int contradictions = 0;
+  for (int pass = 0; pass < 2; ++pass) {
+    steps.events.clear();
+    for (int k = 0; k < 1500; ++k) {
+      steps.imu(steps.time + 0.05, -0.1);
+      steps.step();
+    }
+    for (const PipelineEvent& event : steps.events) {
+      contradictions += event.text.find("upside down") != std::string::npos;
+    }
+    EXPECT_EQ(contradictions, pass + 1) << "once until a reset";
+    steps.source.reset();
+    EXPECT_EQ(steps.step(), 0.1);
+  }
+}
+
+TEST(YawRateSource, RateIsFiniteAndOfARobotsSize) {
+  EXPECT_TRUE(is_usable_yaw_rate(-49.0));
+  for (const double bad :
+       {51.0, -1e300, std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+    EXPECT_FALSE(is_usable_yaw_rate(bad)) << bad;
+  }
+}
+
+}  // namespace
+}  // namespace urban_gnss
