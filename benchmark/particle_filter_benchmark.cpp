@@ -6,6 +6,7 @@
 #include <benchmark/benchmark.h>
 
 #include "urban_gnss_localization/localizers/nishida/bias_kalman_filter.hpp"
+#include "urban_gnss_localization/localizers/nishida/particle_filter.hpp"
 #include "urban_gnss_localization/localizers/switching/switching_particle_filter.hpp"
 
 namespace urban_gnss {
@@ -38,13 +39,13 @@ ParticleSet cloud(std::size_t count) {
 
 void count_particles(benchmark::State& state) { state.SetItemsProcessed(state.iterations() * state.range(0)); }
 
+FixSigmaParameters known_sigmas() { return {false, 0.05, 0.316}; }
+
 /// One step of odometry and a fix, in a shadow.
-void run_steps(benchmark::State& state, ParticleFilterParameters parameters) {
-  parameters.model.fix.direct_sigma = 0.05;
-  parameters.model.fix.shadow_sigma = 0.316;
-  parameters.model.fix.use_fix_covariance = false;
+template <class Filter, class Parameters>
+void run_steps(benchmark::State& state, Parameters parameters) {
   parameters.cluster_cell = 0.5;
-  const auto filter = make_particle_filter(parameters, paper_motion());
+  const auto filter = std::make_unique<Filter>(parameters, paper_motion());
   filter->initialize({});
   Pose2 truth;
   FixMeasurement fix;
@@ -63,24 +64,23 @@ void run_steps(benchmark::State& state, ParticleFilterParameters parameters) {
 void BM_PaperStep(benchmark::State& state) {
   ParticleFilterParameters parameters;
   parameters.particle_count = static_cast<int>(state.range(0));
-  run_steps(state, parameters);
+  parameters.fix = known_sigmas();
+  run_steps<ParticleFilter>(state, parameters);
 }
 BENCHMARK(BM_PaperStep)->Arg(1000)->Arg(10000)->Unit(benchmark::kMicrosecond);
 
 /// With as many particles as are plausible.
 void BM_SwitchingStep(benchmark::State& state) {
-  ParticleFilterParameters parameters;
-  parameters.mode = ParticleFilterMode::kSwitching;
-  run_steps(state, parameters);
+  SwitchingParticleFilterParameters parameters;
+  parameters.model.fix = known_sigmas();
+  run_steps<SwitchingParticleFilter>(state, parameters);
 }
 BENCHMARK(BM_SwitchingStep)->Unit(benchmark::kMicrosecond);
 
 /// The switching filter with all the particles that it may have: a heading that is not known.
 std::unique_ptr<ParticleLocalizer> all_headings(PoseEstimate& start) {
-  ParticleFilterParameters parameters;
-  parameters.mode = ParticleFilterMode::kSwitching;
   start.covariance = Eigen::Vector3d(1.0, 1.0, 4.0).asDiagonal();
-  auto filter = make_particle_filter(parameters, paper_motion());
+  auto filter = std::make_unique<SwitchingParticleFilter>(SwitchingParticleFilterParameters{}, paper_motion());
   filter->initialize(start);
   return filter;
 }

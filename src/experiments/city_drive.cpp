@@ -117,13 +117,6 @@ std::vector<SatelliteObservation> to_observations(const std::vector<SatelliteRep
   return observations;
 }
 
-Eigen::Isometry3d to_isometry(const Pose2& pose) {
-  Eigen::Isometry3d isometry = Eigen::Isometry3d::Identity();
-  isometry.translate(Eigen::Vector3d(pose.x, pose.y, 0.0));
-  isometry.rotate(Eigen::AngleAxisd(pose.yaw, Eigen::Vector3d::UnitZ()));
-  return isometry;
-}
-
 DriveRecord drive_city(Scenario scenario, int cloud_every, const std::vector<DriveParticipant*>& participants,
                        const std::function<void(double)>& on_progress) {
   if (std::none_of(participants.begin(), participants.end(), [](const auto* each) { return each->wants_clouds(); })) {

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "urban_gnss_localization/experiments/city_drive.hpp"
+#include "urban_gnss_localization/geometry/isometry.hpp"
 #include "urban_gnss_localization/geometry/local_frame.hpp"
 #include "urban_gnss_localization/pipeline/bias_responder.hpp"
 

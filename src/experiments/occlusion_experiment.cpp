@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "urban_gnss_localization/experiments/city_drive.hpp"
+#include "urban_gnss_localization/geometry/isometry.hpp"
 #include "urban_gnss_localization/geometry/local_frame.hpp"
 
 namespace urban_gnss {

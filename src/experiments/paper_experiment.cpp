@@ -7,6 +7,7 @@
 
 #include "urban_gnss_localization/localizers/switching/imm_ekf.hpp"
 #include "urban_gnss_localization/localizers/switching/switching_particle_filter.hpp"
+#include "urban_gnss_localization/parameters/parameter_reader.hpp"
 #include "urban_gnss_localization/pipeline/bias_pipeline.hpp"
 
 namespace urban_gnss {
@@ -48,13 +49,8 @@ class Estimator {
       dead_reckoned_ = single.pose(0);
       return;
     }
-    if (kind_ == PaperMethod::Kind::kImm) {
-      filter_ = std::make_unique<ImmEkf>(conditions.filter.model, conditions.filter_motion);
-    } else {
-      auto filter = make_particle_filter(conditions.filter, conditions.filter_motion);
-      particle_filter_ = filter.get();
-      filter_ = std::move(filter);
-    }
+    filter_ = make_filter(conditions);
+    particle_filter_ = dynamic_cast<const ParticleLocalizer*>(filter_.get());
     filter_->initialize(start);
   }
 
@@ -90,6 +86,16 @@ class Estimator {
   const ParticleSet* particles() const { return particle_filter_ ? &particle_filter_->particles() : nullptr; }
 
  private:
+  std::unique_ptr<Localizer> make_filter(const PaperExperimentConditions& conditions) const {
+    switch (kind_) {
+      case PaperMethod::Kind::kImm:
+        return std::make_unique<ImmEkf>(conditions.switching.model, conditions.switching_motion);
+      case PaperMethod::Kind::kSwitching:
+        return std::make_unique<SwitchingParticleFilter>(conditions.switching, conditions.switching_motion);
+      default: return std::make_unique<ParticleFilter>(conditions.filter, conditions.filter_motion);
+    }
+  }
+
   PaperMethod::Kind kind_;
   PaperFieldParameters field_;
   BiasTracker bias_;
@@ -102,28 +108,28 @@ class Estimator {
 void make_oracle(PaperExperimentConditions& c) {
   c.filter.mode = ParticleFilterMode::kConventional;
   c.filter.likelihood = LikelihoodChoice::kProduct;
-  c.filter.model.fix.use_fix_covariance = true;
+  c.filter.fix.use_fix_covariance = true;
 }
 
 }  // namespace
 
-PaperExperimentConditions read_paper_conditions(const PaperFiles& files) {
+PaperExperimentConditions read_paper_conditions(const YAML::Node& files) {
   PaperExperimentConditions conditions;
   std::vector<std::string> faults;
-  const auto read = [&](const std::string& name, const auto& ignored, auto&... structs) {
-    const auto file = files.find(name);
-    ParameterReader reader(file == files.end() ? YAML::Node() : file->second);
-    for (const char* other : ignored) reader.ignore(other);
+  const auto read = [&](const std::string& name, auto&&... structs) {
+    ParameterReader reader(files[name], "", name + ".", Layout::kTiered);
+    reader.ignore("field");  // which simulation the simulator's node runs
     (reader.read(structs), ...);
-    for (const std::string& fault : reader.finish()) faults.push_back(name + "." + fault);
+    const auto found = reader.finish();
+    faults.insert(faults.end(), found.begin(), found.end());
   };
-  const std::vector<const char*> nothing;
-  read("simulator", std::vector<const char*>{"field"}, conditions.field, conditions.field_motion);
-  read("particle_filter", nothing, conditions.filter, conditions.filter_motion);
+  read("simulator", WithMotion{conditions.field, conditions.field_motion});
+  read("particle_filter", WithMotion{conditions.filter, conditions.filter_motion});
+  read("switching_particle_filter", WithMotion{conditions.switching, conditions.switching_motion});
   BiasPipelineParameters bias_node;  // the file is the node's, which has more than the filter
-  read("gps_bias", nothing, bias_node);
+  read("gps_bias", bias_node);
   conditions.bias = bias_node.bias;
-  read("waypoint_controller", nothing, conditions.controller);
+  read("waypoint_controller", conditions.controller);
   if (!faults.empty()) throw ParameterError("the paper's field", faults);
   conditions.controller.targets = conditions.field.targets();
   return conditions;
@@ -157,8 +163,7 @@ const std::vector<PaperMethod>& paper_methods() {
          c.filter.mode = ParticleFilterMode::kConventional;
          c.filter.likelihood = LikelihoodChoice::kProduct;
        }},
-      {"switching", Kind::kFilter, "switching bias, Rao-Blackwellized particle filter",
-       [](auto& c) { c.filter.mode = ParticleFilterMode::kSwitching; }},
+      {"switching", Kind::kSwitching, "switching bias, Rao-Blackwellized particle filter", [](auto&) {}},
       {"imm", Kind::kImm, "switching bias, interacting multiple models", [](auto&) {}},
       {"dead_reckoning", Kind::kDeadReckoning, "the inputs alone", [](auto&) {}},
       {"oracle_zone", Kind::kOracleZone, "knows the shadow and drops the fix there", make_oracle},

@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "urban_gnss_localization/geometry/local_frame.hpp"
-#include "urban_gnss_localization/gnss/fix_sanitation.hpp"
+#include "urban_gnss_localization/gnss/fix_validation.hpp"
 
 namespace urban_gnss {
 namespace {

@@ -7,17 +7,12 @@
 #include <numeric>
 #include <set>
 
-#include "reception.hpp"
+#include "urban_gnss_localization/common/positive_definite.hpp"
 #include "urban_gnss_localization/geometry/angles.hpp"
 #include "urban_gnss_localization/gnss/dilution_of_precision.hpp"
 
 namespace urban_gnss {
 namespace {
-
-constexpr double kReferenceCotangent = 4.0 / 3.0;
-const double kReferenceElevation_rad = std::asin(kReferenceSine);
-constexpr double kLowestElevation_rad = 15.0 * kPi / 180.0;  ///< from which reflections grow no more
-constexpr double kMaxCn0_dbhz = 70.0;
 
 /// Shares of blocked, free and unknown rays; they sum to 1.
 struct RayShares {
@@ -46,10 +41,7 @@ double nlos_by_map(const RayShares& rays, const GnssCovarianceParameters& parame
 double nlos_probability(const SatelliteObservation& satellite, const GnssCovarianceParameters& parameters) {
   const double by_map = nlos_by_map(ray_shares(satellite.blocked_fraction, satellite.known_fraction), parameters);
   if (!has_cn0(satellite)) return by_map;
-  const double cn0 = std::min(satellite.cn0_dbhz, kMaxCn0_dbhz);
-  const double as_likely =
-      parameters.nlos_cn0 + parameters.nlos_cn0_rise * (std::sin(satellite.look.elevation_rad) - kReferenceSine);
-  const double by_signal = (as_likely - cn0) / parameters.nlos_cn0_width;
+  const double by_signal = nlos_log_odds(satellite, parameters.nlos_cn0, parameters.nlos);
   return probability_of(by_signal + log_odds(by_map) - log_odds(parameters.nlos_if_unknown));
 }
 
@@ -65,19 +57,14 @@ struct RangeError {
   double variance_m2;
 };
 
-/// Of one that is reflected with probability p, where reflections are `scale` times as large as the parameters say.
-RangeError range_error(double p, double scale, const GnssCovarianceParameters& parameters) {
-  const double mean_m = scale * parameters.nlos_mean;
-  const double sigma_m = std::max(scale * parameters.nlos_sigma, parameters.sigma_ure);
+/// Of one from this elevation that is NLOS with probability p, where this share of the satellites is hidden.
+RangeError range_error(double p, double elevation_rad, double hidden_share,
+                       const GnssCovarianceParameters& parameters) {
+  const NlosRange nlos =
+      nlos_range(elevation_rad, parameters.nlos, std::pow(hidden_share, parameters.nlos_hidden_exponent));
+  const double sigma_m = std::max(nlos.sigma_m, parameters.sigma_ure);
   const double direct_m2 = parameters.sigma_ure * parameters.sigma_ure;
-  return {p * mean_m, (1.0 - p) * direct_m2 + p * sigma_m * sigma_m + p * (1.0 - p) * mean_m * mean_m};
-}
-
-/// How large reflections from this elevation are against the parameters, where this share of the satellites is hidden.
-double nlos_scale(double elevation_rad, double hidden_share, const GnssCovarianceParameters& parameters) {
-  const double cotangent = std::max(0.0, 1.0 / std::tan(std::max(elevation_rad, kLowestElevation_rad)));
-  return std::pow(hidden_share, parameters.nlos_hidden_exponent) *
-         std::pow(cotangent / kReferenceCotangent, parameters.nlos_elevation_exponent);
+  return {p * nlos.mean_m, (1.0 - p) * direct_m2 + p * sigma_m * sigma_m + p * (1.0 - p) * nlos.mean_m * nlos.mean_m};
 }
 
 Eigen::Matrix2d symmetric(const Eigen::Matrix2d& matrix) { return 0.5 * (matrix + matrix.transpose()); }
@@ -86,11 +73,6 @@ Eigen::Matrix2d symmetric(const Eigen::Matrix2d& matrix) { return 0.5 * (matrix 
 Eigen::Matrix2d covariance_of(const std::optional<DilutionOfPrecision>& dop,
                               const GnssCovarianceParameters& parameters) {
   return dop ? symmetric(horizontal_covariance(*dop, parameters.sigma_ure)) : parameters.filter.infinite();
-}
-
-bool has_direction(const SatelliteObservation& satellite) {
-  const LookAngles& look = satellite.look;
-  return std::isfinite(look.azimuth_rad) && look.elevation_rad >= 0.0 && look.elevation_rad <= 0.5 * kPi + 1e-6;
 }
 
 /// Receivers of two frequencies report a satellite twice; its direction counts once, with the better signal.
@@ -169,10 +151,6 @@ std::optional<SoftError> soft_error(const std::vector<RangingSatellite>& satelli
   return SoftError{gain * mean, symmetric(gain * variance.asDiagonal() * gain.transpose())};
 }
 
-bool is_positive_definite(const Eigen::Matrix2d& matrix) {
-  return matrix.allFinite() && Eigen::LLT<Eigen::Matrix2d>(matrix).info() == Eigen::Success;
-}
-
 /// The claim, where there is one; beyond 1000 km, that.
 std::optional<Eigen::Matrix2d> usable_claim(const std::optional<Eigen::Matrix2d>& claimed) {
   if (!claimed || claimed->hasNaN()) return std::nullopt;
@@ -200,7 +178,7 @@ void without_satellites(const std::optional<SkyObservation>& sky, const std::opt
   result.source = VisibilitySource::kLidar;
   if (parameters.model == CovarianceModel::kConventional) return;
   const auto variance_m2 = [&](double p) {  // of a satellite in a sky of which the share p is hidden
-    return range_error(p, nlos_scale(kReferenceElevation_rad, p, parameters), parameters).variance_m2;
+    return range_error(p, kNlosReferenceElevation_rad, p, parameters).variance_m2;
   };
   const double added_m2 = variance_m2(nlos_by_map(rays, parameters)) - variance_m2(parameters.nlos_if_free);
   result.model *= 1.0 + std::max(added_m2, 0.0) / (parameters.sigma_ure * parameters.sigma_ure);
@@ -244,8 +222,7 @@ void with_satellites(const std::vector<SatelliteObservation>& satellites, const 
       for (std::size_t k = 0; k < used.size(); ++k) {
         const SatelliteObservation& satellite = satellites[used[k]];
         all[k].weight = receiver_weight(satellite, parameters);
-        const double scale = nlos_scale(satellite.look.elevation_rad, hidden, parameters);
-        errors.push_back(range_error(probabilities[k], scale, parameters));
+        errors.push_back(range_error(probabilities[k], satellite.look.elevation_rad, hidden, parameters));
       }
       const auto error = soft_error(all, errors);
       result.model = error ? error->second_moment() : parameters.filter.infinite();
@@ -260,7 +237,7 @@ Eigen::Matrix2d bounded(const Eigen::Matrix2d& covariance, const std::optional<E
                         const GnssCovarianceParameters& parameters) {
   const Eigen::Matrix2d usable = is_positive_definite(covariance) ? covariance : parameters.filter.infinite();
   if (!claim || parameters.allow_smaller) return usable;
-  const Eigen::Matrix2d result = at_least(usable, *claim);
+  const Eigen::Matrix2d result = covariance_upper_bound(usable, *claim);
   return is_positive_definite(result) ? result : Eigen::Matrix2d(*claim + parameters.filter.infinite());
 }
 
@@ -287,15 +264,13 @@ const char* to_string(VisibilitySource source) {
 }
 
 void GnssCovarianceParameters::check(std::vector<std::string>& faults) const {
-  memory.check(faults);
-  filter.check(faults);
   if (!(nlos_if_free <= nlos_if_unknown && nlos_if_unknown <= nlos_if_blocked)) {
     faults.push_back("nlos_if_unknown = " + std::to_string(nlos_if_unknown) + ": must lie between nlos_if_free = " +
                      std::to_string(nlos_if_free) + " and nlos_if_blocked = " + std::to_string(nlos_if_blocked));
   }
 }
 
-Eigen::Matrix2d at_least(const Eigen::Matrix2d& matrix, const Eigen::Matrix2d& floor) {
+Eigen::Matrix2d covariance_upper_bound(const Eigen::Matrix2d& matrix, const Eigen::Matrix2d& floor) {
   // In coordinates in which the floor is a unit circle, axes of the ellipse shorter than 1 are stretched to 1.
   const Eigen::Matrix2d root = Eigen::LLT<Eigen::Matrix2d>(floor).matrixL();
   const Eigen::Matrix2d half = root.triangularView<Eigen::Lower>().solve(matrix);
@@ -341,10 +316,10 @@ GnssCovariance GnssCovarianceModel::process(Stamp stamp, const std::vector<Satel
       const bool is_determined = result.satellite_count == 0 || std::isfinite(result.hdop_all);
       if (!is_determined) break;
       const bool is_good_alone = result.is_good;
-      const Eigen::Matrix2d remembered =
-          memory_.add(stamp, result.bias, result.model - result.bias * result.bias.transpose());
-      result.weighted = bounded(remembered, usable_claim(claimed), parameters_);
-      result.is_good = position_sigma(remembered) <= parameters_.filter.sigma_threshold;
+      const Eigen::Matrix2d smoothed =
+          smoothing_.add(stamp, result.bias, result.model - result.bias * result.bias.transpose());
+      result.weighted = bounded(smoothed, usable_claim(claimed), parameters_);
+      result.is_good = position_sigma(smoothed) <= parameters_.filter.sigma_threshold;
       result.is_recovering = is_good_alone && !result.is_good;
       break;
     }
@@ -354,7 +329,7 @@ GnssCovariance GnssCovarianceModel::process(Stamp stamp, const std::vector<Satel
 
 void GnssCovarianceModel::reset() {
   filter_.reset();
-  memory_.reset();
+  smoothing_.reset();
 }
 
 }  // namespace urban_gnss

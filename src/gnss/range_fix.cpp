@@ -5,13 +5,11 @@
 #include <cmath>
 #include <map>
 
-#include "reception.hpp"
+#include "urban_gnss_localization/common/positive_definite.hpp"
 
 namespace urban_gnss {
 namespace {
 
-constexpr double kLowestSine = 0.1;
-constexpr double kFreeShare = 0.9;  ///< quantile of C/N0 that free signals have
 constexpr double kMostCertain = 0.98;
 constexpr double kFarthest_m = 100.0;
 constexpr double kLeastSigma_m = 1e-3;
@@ -21,31 +19,22 @@ constexpr int kPlane = 2;
 constexpr int kHeight = 2;
 constexpr int kFirstClock = 3;
 
-/// As if at kReferenceSine.
-double levelled_cn0_dbhz(const SatelliteObservation& satellite, const RangeFixParameters& p) {
-  return satellite.cn0_dbhz - p.antenna_cn0_rise * (std::sin(satellite.look.elevation_rad) - kReferenceSine);
-}
-
-bool has_signal(const SatelliteObservation& satellite) {
-  return satellite.tracked && std::isfinite(satellite.look.azimuth_rad) && satellite.look.elevation_rad >= 0.0 &&
-         std::isfinite(satellite.look.elevation_rad) && has_cn0(satellite);
-}
-
 struct SatelliteRange {
   Constellation clock;
   Eigen::Vector3d line_of_sight;
   double residual_m;
-  double reflected_before;  ///< probability by C/N0
-  double reflected_m;       ///< mean, if it is
-  double reflected_variance_m2;
+  double nlos_before;  ///< probability of NLOS by C/N0
+  NlosRange nlos;      ///< excess, if it is
+
+  double nlos_variance_m2() const { return nlos.sigma_m * nlos.sigma_m; }
 };
 
-std::vector<SatelliteRange> ranges_of(const std::vector<SatelliteObservation>& satellites, double free_cn0_dbhz,
+std::vector<SatelliteRange> ranges_of(const std::vector<SatelliteObservation>& satellites, double nominal_cn0_dbhz,
                                       const RangeFixParameters& p) {
   std::map<SatelliteId, const SatelliteObservation*> usable;  // one signal of each satellite
   std::map<Constellation, int> sharing;
   for (const SatelliteObservation& each : satellites) {
-    if (!has_signal(each) || !(std::abs(each.residual_m) <= kMaxResidual_m)) continue;
+    if (!is_received(each) || !(std::abs(each.residual_m) <= kMaxResidual_m)) continue;
     if (usable.emplace(each.id, &each).second) ++sharing[clock_of(each.id.constellation)];
   }
   std::vector<SatelliteRange> ranges;
@@ -53,13 +42,9 @@ std::vector<SatelliteRange> ranges_of(const std::vector<SatelliteObservation>& s
     const SatelliteObservation& each = *observation;
     const Constellation clock = clock_of(id.constellation);
     if (sharing[clock] < 2) continue;  // alone, it only tells its clock
-    const double weaker_db = free_cn0_dbhz - levelled_cn0_dbhz(each, p);
-    const double reflected = probability_of((weaker_db - p.weak_cn0_drop) / p.weak_cn0_width);
-    const double larger = std::pow(kReferenceSine / std::max(std::sin(each.look.elevation_rad), kLowestSine),
-                                   p.reflected_elevation_exponent);
+    const double nlos = probability_of(nlos_log_odds(each, nominal_cn0_dbhz - p.nlos_cn0_drop, p.nlos));
     ranges.push_back({clock, line_of_sight(each.look), each.residual_m,
-                      std::clamp(reflected, 1.0 - kMostCertain, kMostCertain), larger * p.reflected_range,
-                      std::pow(larger * p.reflected_range_sigma, 2)});
+                      std::clamp(nlos, 1.0 - kMostCertain, kMostCertain), nlos_range(each.look.elevation_rad, p.nlos)});
   }
   return ranges;
 }
@@ -68,7 +53,7 @@ double log_gaussian(double error, double variance) {
   return -0.5 * error * error / variance - 0.5 * std::log(variance);
 }
 
-/// Least squares for the antenna's place, its height and the clocks, of ranges that are each reflected with a
+/// Least squares for the antenna's place, its height and the clocks, of ranges that are each NLOS with a
 /// probability.
 class RangeSystem {
  public:
@@ -82,36 +67,36 @@ class RangeSystem {
     const auto count = static_cast<Eigen::Index>(ranges.size());
     unknowns_ = kFirstClock + static_cast<Eigen::Index>(clocks.size());
     h_ = Eigen::MatrixXd::Zero(count, unknowns_);
-    reflected_.resize(count);
+    nlos_probability_.resize(count);
     for (Eigen::Index i = 0; i < count; ++i) {
       const SatelliteRange& range = ranges[static_cast<std::size_t>(i)];
       h_.row(i).head<3>() = -range.line_of_sight;
       h_(i, clocks.at(range.clock)) = 1.0;
-      reflected_[i] = range.reflected_before;
+      nlos_probability_[i] = range.nlos_before;
     }
   }
 
   /// Maximization: the normal equations, where every range counts as both kinds by its probability.
   void weigh() {
-    set_normal([&](const SatelliteRange& range, double reflected) {
-      const double by_reflection = reflected / range.reflected_variance_m2;
-      const double weight = (1.0 - reflected) / direct_variance_m2_ + by_reflection;
-      return WeighedRange{range.residual_m - by_reflection * range.reflected_m / weight, weight};
+    set_normal([&](const SatelliteRange& range, double nlos) {
+      const double by_nlos = nlos / range.nlos_variance_m2();
+      const double weight = (1.0 - nlos) / direct_variance_m2_ + by_nlos;
+      return WeighedRange{range.residual_m - by_nlos * range.nlos.mean_m / weight, weight};
     });
   }
 
   /// The same where every range counts as one Gaussian, with the mean and variance of both kinds together: where it is
   /// open which it is, it says little.
   void weigh_by_moments() {
-    set_normal([&](const SatelliteRange& range, double reflected) {
-      const double direct = 1.0 - reflected;
-      const double variance = direct * direct_variance_m2_ + reflected * range.reflected_variance_m2 +
-                              direct * reflected * range.reflected_m * range.reflected_m;
-      return WeighedRange{range.residual_m - reflected * range.reflected_m, 1.0 / variance};
+    set_normal([&](const SatelliteRange& range, double nlos) {
+      const double direct = 1.0 - nlos;
+      const double variance = direct * direct_variance_m2_ + nlos * range.nlos_variance_m2() +
+                              direct * nlos * range.nlos.mean_m * range.nlos.mean_m;
+      return WeighedRange{range.residual_m - nlos * range.nlos.mean_m, 1.0 / variance};
     });
   }
 
-  /// Expectation: which ranges are reflected, given the solution of the normal equations and what is known.
+  /// Expectation: which ranges are NLOS, given the solution of the normal equations and what is known.
   void judge(const RelativePlace& known) {
     const Eigen::Matrix2d information = known.covariance.inverse();
     Eigen::MatrixXd normal = normal_;
@@ -125,9 +110,9 @@ class RangeSystem {
       const SatelliteRange& range = ranges_[static_cast<std::size_t>(i)];
       const double error = range.residual_m - h_.row(i).dot(solution);
       const double variance = h_.row(i) * covariance * h_.row(i).transpose();
-      reflected_[i] = probability_of(log_odds(range.reflected_before) +
-                                     log_gaussian(error - range.reflected_m, range.reflected_variance_m2 + variance) -
-                                     log_gaussian(error, direct_variance_m2_ + variance));
+      nlos_probability_[i] = probability_of(
+          log_odds(range.nlos_before) + log_gaussian(error - range.nlos.mean_m, range.nlos_variance_m2() + variance) -
+          log_gaussian(error, direct_variance_m2_ + variance));
     }
   }
 
@@ -157,7 +142,7 @@ class RangeSystem {
     Eigen::VectorXd weight(h_.rows());
     Eigen::VectorXd target(h_.rows());
     for (Eigen::Index i = 0; i < h_.rows(); ++i) {
-      const WeighedRange weighed = weigh(ranges_[static_cast<std::size_t>(i)], reflected_[i]);
+      const WeighedRange weighed = weigh(ranges_[static_cast<std::size_t>(i)], nlos_probability_[i]);
       weight[i] = weighed.weight;
       target[i] = weighed.residual_m;
     }
@@ -172,35 +157,16 @@ class RangeSystem {
   double height_information_;
   Eigen::Index unknowns_;
   Eigen::MatrixXd h_;
-  Eigen::VectorXd reflected_;  ///< probabilities
+  Eigen::VectorXd nlos_probability_;  ///< probabilities
   Eigen::MatrixXd normal_;
   Eigen::VectorXd right_;
 };
 
 }  // namespace
 
-void FreeSignalLevel::add(const std::vector<SatelliteObservation>& satellites, const RangeFixParameters& parameters) {
-  for (const SatelliteObservation& each : satellites) {
-    if (!has_signal(each)) continue;
-    const double level = std::clamp(std::round(levelled_cn0_dbhz(each, parameters)), 0.0, kBins - 1.0);
-    ++counts_[static_cast<std::size_t>(level)];
-    ++total_;
-  }
-}
-
-std::optional<double> FreeSignalLevel::cn0_dbhz() const {
-  if (total_ == 0) return std::nullopt;
-  double below = 0.0;
-  for (std::size_t bin = 0; bin < kBins; ++bin) {
-    below += counts_[bin];
-    if (below >= kFreeShare * total_) return static_cast<double>(bin);
-  }
-  return kBins - 1.0;
-}
-
-std::optional<RelativePlace> range_fix(const std::vector<SatelliteObservation>& satellites, double free_cn0_dbhz,
+std::optional<RelativePlace> range_fix(const std::vector<SatelliteObservation>& satellites, double nominal_cn0_dbhz,
                                        const RelativePlace& known, const RangeFixParameters& parameters) {
-  const std::vector<SatelliteRange> ranges = ranges_of(satellites, free_cn0_dbhz, parameters);
+  const std::vector<SatelliteRange> ranges = ranges_of(satellites, nominal_cn0_dbhz, parameters);
   if (ranges.empty()) return std::nullopt;
   RelativePlace certain = known;  // never wholly, so that it can be inverted
   certain.covariance.diagonal().array() += kLeastSigma_m * kLeastSigma_m;
@@ -212,8 +178,7 @@ std::optional<RelativePlace> range_fix(const std::vector<SatelliteObservation>& 
   system.weigh_by_moments();
   const RelativePlace place = system.place();
   // Ranges of micrometres leave nothing but rounding errors of a direction of which they say nothing.
-  const bool is_positive_definite = place.covariance(0, 0) > 0.0 && place.covariance.determinant() > 0.0;
-  if (!place.offset.allFinite() || !is_positive_definite) return std::nullopt;
+  if (!place.offset.allFinite() || !is_positive_definite(place.covariance)) return std::nullopt;
   return place;
 }
 

@@ -1,5 +1,7 @@
 #include "urban_gnss_localization/gnss/satellite.hpp"
 
+#include "urban_gnss_localization/geometry/angles.hpp"
+
 namespace urban_gnss {
 namespace {
 
@@ -23,6 +25,21 @@ char rinex_letter(Constellation constellation) {
 Constellation clock_of(Constellation constellation) {
   const bool keeps_gps_time = constellation == Constellation::kSbas || constellation == Constellation::kQzss;
   return keeps_gps_time ? Constellation::kGps : constellation;
+}
+
+bool has_direction(const SatelliteObservation& satellite) {
+  constexpr double kRounding_rad = 1e-6;  // of receivers that give the zenith in single precision
+  const LookAngles& look = satellite.look;
+  return std::isfinite(look.azimuth_rad) && look.elevation_rad >= 0.0 &&
+         look.elevation_rad <= 0.5 * kPi + kRounding_rad;
+}
+
+bool has_cn0(const SatelliteObservation& satellite) {
+  return std::isfinite(satellite.cn0_dbhz) && satellite.cn0_dbhz > 0.0;
+}
+
+bool is_received(const SatelliteObservation& satellite) {
+  return satellite.tracked && has_direction(satellite) && has_cn0(satellite);
 }
 
 std::string satellite_name(const SatelliteId& id) {

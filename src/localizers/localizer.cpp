@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "urban_gnss_localization/localizers/maier/unscented.hpp"
+#include "urban_gnss_localization/common/positive_definite.hpp"
 
 namespace urban_gnss {
 

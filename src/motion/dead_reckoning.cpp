@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "urban_gnss_localization/motion/standstill.hpp"
+
 namespace urban_gnss {
 namespace {
 
@@ -30,44 +32,13 @@ Eigen::Matrix<double, 3, 2> linearise(const Pose2& pose, const OdometryErrors& e
 
 }  // namespace
 
-bool is_standstill(const Twist2& twist) {
-  constexpr double kStandstill_mps = 1e-3;
-  constexpr double kStandstill_radps = 1e-4;
-  return std::abs(twist.speed_mps) < kStandstill_mps && std::abs(twist.yaw_rate_radps) < kStandstill_radps;
-}
-
-DeadReckoningStep dead_reckon(const Pose2& pose, const OdometryErrors& errors, const Twist2& measured,
-                              double duration_s, const DeadReckoningParameters& p) {
-  DeadReckoningStep step;
-  step.transition.setIdentity();
-  step.noise.setZero();
-  step.yaw_rate_scale.setZero();
-  if (p.estimate_odometry_errors) {
-    step.noise(3, 3) = square(p.odom_scale_walk) * duration_s;
-    step.noise(4, 4) = square(p.odom_yaw_bias_walk) * duration_s;
-  }
-  if (is_standstill(measured)) {
-    step.pose = pose;
-    return step;
-  }
-  const auto k = linearise(pose, errors, measured, duration_s, step);
-  if (!p.estimate_odometry_errors) step.transition.topRightCorner<3, 2>().setZero();
-  const Eigen::Vector2d sigma_v(square(p.odom_speed_noise * measured.speed_mps) * duration_s,
-                                square(p.odom_yaw_rate_noise * measured.yaw_rate_radps) * duration_s);
-  const Eigen::Vector3d sigma_n(square(p.odom_position_noise) * duration_s, square(p.odom_position_noise) * duration_s,
-                                square(p.odom_heading_noise) * duration_s);
-  step.noise.topLeftCorner<3, 3>() = k * sigma_v.asDiagonal() * k.transpose();
-  step.noise.topLeftCorner<3, 3>().diagonal() += sigma_n;
-  return step;
-}
-
 DeadReckoningStep dead_reckon(const Pose2& pose, const OdometryErrors& errors, const MotionStep& motion,
                               const OdometryErrorParameters& p) {
   const double dt = motion.duration_s;
   DeadReckoningStep step;
   step.noise.setZero();
   step.yaw_rate_scale.setZero();
-  if (is_parked(motion.twist)) {
+  if (is_standstill(motion.twist)) {
     step.pose = pose;
     step.transition.setIdentity();
     step.noise(0, 0) = step.noise(1, 1) = square(p.parked_walk) * dt;
@@ -99,16 +70,6 @@ ErrorCovariance initial_error_covariance(const Eigen::Matrix3d& pose_covariance,
   covariance.topLeftCorner<3, 3>() = pose_covariance;
   covariance(3, 3) = square(p.speed_scale_sigma);
   covariance(4, 4) = square(p.yaw_rate_bias_sigma);
-  return covariance;
-}
-
-ErrorCovariance initial_error_covariance(const Eigen::Matrix3d& pose_covariance, const DeadReckoningParameters& p) {
-  ErrorCovariance covariance = ErrorCovariance::Zero();
-  covariance.topLeftCorner<3, 3>() = pose_covariance;
-  if (p.estimate_odometry_errors) {
-    covariance(3, 3) = square(p.odom_scale_sigma);
-    covariance(4, 4) = square(p.odom_yaw_bias_sigma);
-  }
   return covariance;
 }
 

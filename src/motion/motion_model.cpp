@@ -2,13 +2,9 @@
 
 #include <cmath>
 
+#include "urban_gnss_localization/motion/standstill.hpp"
+
 namespace urban_gnss {
-namespace {
-
-/// Below this speed a steering angle cannot be told from a twist.
-constexpr double kStandstill_mps = 1e-3;
-
-}  // namespace
 
 EnumNames<MotionModel> enum_names(MotionModel) {
   return {{"bicycle", MotionModel::kBicycle}, {"velocity", MotionModel::kVelocity}};

@@ -51,7 +51,7 @@ std::optional<Pose2> OdometryHistory::motion_between(Stamp from, Stamp to) const
   const auto start = pose_at(from);
   const auto end = pose_at(to);
   if (!start || !end) return std::nullopt;
-  return between(*start, *end);
+  return relative_pose(*start, *end);
 }
 
 }  // namespace urban_gnss

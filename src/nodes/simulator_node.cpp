@@ -14,12 +14,12 @@
 #include <cmath>
 #include <map>
 
-#include "urban_gnss_localization/simulation_ros/city_markers.hpp"
 #include "urban_gnss_localization/ros/markers.hpp"
 #include "urban_gnss_localization/ros/node_parameters.hpp"
-#include "urban_gnss_localization/simulation_ros/simulation_messages.hpp"
 #include "urban_gnss_localization/simulation/city_simulator.hpp"
 #include "urban_gnss_localization/simulation/paper_field_simulator.hpp"
+#include "urban_gnss_localization/simulation_ros/city_markers.hpp"
+#include "urban_gnss_localization/simulation_ros/simulation_messages.hpp"
 
 using namespace urban_gnss;
 
@@ -34,26 +34,26 @@ EnumNames<Field> enum_names(Field) { return {{"paper_field", Field::kPaperField}
 
 struct NodeParameters {
   Field field{Field::kPaperField};
-  std::string scenario{};                             ///< file of a city's scenario
-  std::vector<double> datum{33.8903, 130.8394, 0.0};  ///< deg, deg, m: origin of the paper's field
-  bool follow_route{false};      ///< drive the scenario's route on the true pose, whatever is commanded
-  bool publish_clock{true};      ///< simulated time on /clock; the other nodes then need use_sim_time
-  double real_time_factor{1.0};  ///< seconds of the simulation in a second, at the most
-  bool wait_for_command{true};   ///< after each step, wait for the command that answers it
-  double command_wait{0.05};     ///< s of wall time, the longest such wait
-  double command_timeout{0.5};   ///< s of simulated time without a command after which the robot stands
+  std::string scenario{};
+  std::vector<double> datum{33.8903, 130.8394, 0.0};
+  bool follow_route{false};
+  bool publish_clock{true};
+  double real_time_factor{1.0};
+  bool wait_for_command{true};
+  double command_wait{0.05};
+  double command_timeout{0.5};
 
-  template <class V>
-  void visit(V& v) {
-    v("field", field);
-    v("scenario", scenario);
-    v("datum", datum);
-    v("follow_route", follow_route);
-    v("publish_clock", publish_clock);
-    v("real_time_factor", real_time_factor, positive());
-    v("wait_for_command", wait_for_command);
-    v("command_wait", command_wait, positive());
-    v("command_timeout", command_timeout, positive());
+  void visit(ParameterVisitor& v) {
+    v.basic()("field", field, "which simulation: that of Nishida et al., section 4, or a scenario with buildings");
+    v.basic()("scenario", scenario, "file of a city's scenario");
+    v.basic()("datum", datum, "deg, deg, m", "origin of the paper's field");
+    v.basic()("follow_route", follow_route, "drive the scenario's route on the true pose, whatever is commanded");
+    v("publish_clock", publish_clock, "simulated time on /clock; the other nodes then need use_sim_time");
+    v.basic()("real_time_factor", real_time_factor, positive(), "", "seconds of the simulation in a second, at the most");
+    v("wait_for_command", wait_for_command, "after each step, wait for the command that answers it");
+    v("command_wait", command_wait, positive(), "s", "the longest such wait, of wall time");
+    v("command_timeout", command_timeout, positive(), "s",
+      "of simulated time without a command after which the robot stands");
   }
   void check(std::vector<std::string>& faults) const {
     if (field == Field::kCity && scenario.empty()) faults.push_back("scenario: a city needs the file of a scenario");
@@ -66,13 +66,9 @@ struct NodeParameters {
 };
 
 struct SeedParameter {
-  int seed{-1};  ///< of a scenario; negative for the file's own
+  int seed{-1};
 
-  template <class V>
-  void visit(V& v) {
-    v("seed", seed, any_number());
-  }
-  void check(std::vector<std::string>&) const {}
+  void visit(ParameterVisitor& v) { v.basic()("seed", seed, any_number(), "", "of a scenario; negative for the file's own"); }
 };
 
 class SimulatorNode {
@@ -99,7 +95,8 @@ class SimulatorNode {
     reader.read(frames_).read(parameters_);
     if (parameters_.field == Field::kPaperField) {
       PaperFieldParameters field;
-      reader.read(field).read(motion_);
+      WithMotion with_motion{field, motion_};
+      reader.read(with_motion);
       finish_reading(private_node, reader);
       simulator_ = std::make_unique<PaperFieldSimulator>(field, motion_);
       field_ = field;

@@ -20,15 +20,14 @@ namespace {
 constexpr double kTimeJump_s = 1.0;
 
 struct NodeParameters {
-  int first_target{0};           ///< index of the target to steer for first
-  double estimate_timeout{0.5};  ///< s of wall time without an estimate after which the robot is stopped
+  int first_target{0};
+  double estimate_timeout{0.5};
 
-  template <class V>
-  void visit(V& v) {
-    v("first_target", first_target, non_negative());
-    v("estimate_timeout", estimate_timeout, positive());
+  void visit(ParameterVisitor& v) {
+    v.basic()("first_target", first_target, non_negative(), "", "index of the target to steer for first");
+    v.basic()("estimate_timeout", estimate_timeout, positive(), "s",
+      "of wall time without an estimate after which the robot is stopped");
   }
-  void check(std::vector<std::string>&) const {}
 };
 
 class WaypointControllerNode {

@@ -22,9 +22,7 @@ struct KdTreeRayTracer::Tree {
 
 KdTreeRayTracer::KdTreeRayTracer(const PointCloud& cloud, const KdTreeRayTracerParameters& parameters)
     : tree_(std::make_unique<Tree>()), parameters_(parameters) {
-  std::vector<std::string> faults;
-  parameters.check(faults);
-  if (!faults.empty()) throw ParameterError("kd-tree ray tracer", faults);
+  require_usable("kd-tree ray tracer", parameters);
   const PointCloud finite = finite_points(cloud);
   for (const Eigen::Vector3f& point : finite) tree_->bounds.extend(point.cast<double>());
   if (finite.empty()) return;

@@ -9,10 +9,8 @@ void LocalMapParameters::check(std::vector<std::string>& faults) const {
 LocalMap::LocalMap(const LocalMapParameters& parameters, const VoxelMapParameters& voxel_parameters,
                    const ScanAlignerParameters& aligner_parameters)
     : parameters_(parameters), aligner_parameters_(aligner_parameters), map_(voxel_parameters) {
-  std::vector<std::string> faults;
-  parameters.check(faults);
-  aligner_parameters.check(faults);
-  if (!faults.empty()) throw ParameterError("local map", faults);
+  require_usable("local map", parameters);
+  require_usable("scan aligner", aligner_parameters);
 }
 
 void LocalMap::clear() {

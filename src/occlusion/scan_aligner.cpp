@@ -106,9 +106,7 @@ struct ScanAligner::Target {
 
 ScanAligner::ScanAligner(const PointCloud& map, const ScanAlignerParameters& parameters)
     : target_(std::make_unique<Target>()), parameters_(parameters) {
-  std::vector<std::string> faults;
-  parameters.check(faults);
-  if (!faults.empty()) throw ParameterError("scan aligner", faults);
+  require_usable("scan aligner", parameters);
   target_->points = finite_points(map);
   if (!target_->points.empty()) target_->search.setInputCloud(to_pcl(target_->points));
 }

@@ -37,10 +37,7 @@ VoxelMap::VoxelMap(const VoxelMapParameters& parameters)
       // Some cells less than the keys allow, so that neighbours of cells have keys, too. 100 km is far from any datum.
       farthest_m_(static_cast<float>(std::min(1e5, (kMaxVoxelCoordinate - 100) * parameters.voxel_size))),
       observed_(parameters.observed_cell) {
-  std::vector<std::string> faults;
-  parameters.check(faults);
-  if (!(parameters.voxel_size > 0.0)) faults.push_back("voxel_size: must be positive");
-  if (!faults.empty()) throw ParameterError("voxel map", faults);
+  require_usable("voxel map", parameters);
 }
 
 void VoxelMap::clear() { *this = VoxelMap(parameters_); }

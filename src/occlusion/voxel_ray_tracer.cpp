@@ -160,12 +160,7 @@ VoxelMapParameters voxel_map_parameters_for(double spacing_m) {
 
 VoxelRayTracer::VoxelRayTracer(const VoxelMap& map, const VoxelRayTracerParameters& parameters)
     : map_(&map), parameters_(parameters), link_m_(parameters.link_length * map.parameters().voxel_size) {
-  std::vector<std::string> faults;
-  parameters.check(faults);
-  if (!(parameters.link_length >= 1.0 && parameters.link_length <= VoxelMap::kCellVoxels)) {
-    faults.push_back("link_length: must be between 1 and 4 voxels");
-  }
-  if (!faults.empty()) throw ParameterError("voxel ray tracer", faults);
+  require_usable("voxel ray tracer", parameters);
 }
 
 RayVerdict VoxelRayTracer::trace(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const {

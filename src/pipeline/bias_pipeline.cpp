@@ -89,7 +89,7 @@ void BiasPipeline::process_fixes() {
 }
 
 bool BiasPipeline::process_next_fix() {
-  const SanitizedFix* next = fixes_.next();
+  const ValidatedFix* next = fixes_.next();
   if (next == nullptr || poses_.empty()) return false;
   const Stamp stamp = next->fix.stamp;
   const bool has_estimate = poses_.back().first >= stamp;
@@ -99,7 +99,7 @@ bool BiasPipeline::process_next_fix() {
   // Without odometry between the estimate and the fix the wait may still be worth it.
   if (!pose && !has_waited && (history_.empty() || history_.latest() < stamp)) return false;
 
-  SanitizedFix fix = fixes_.pop();
+  ValidatedFix fix = fixes_.pop();
   if (pose) {
     estimates_.push_back(tracker_.process(fix.fix, transform_point(*pose, antenna_), fix.verdict));
     return true;

@@ -11,7 +11,7 @@ void FixQueue::add(const RawFix& fix) { push_bounded(raw_, fix); }
 std::vector<FixVerdict> FixQueue::validate(const LocalFrame& frame) {
   std::vector<FixVerdict> rejected;
   for (const RawFix& raw : std::exchange(raw_, {})) {
-    SanitizedFix fix = sanitize_fix(raw, frame, last_stamp_, parameters_);
+    ValidatedFix fix = validate_fix(raw, frame, last_stamp_, parameters_);
     if (is_rejected(fix.verdict.decision)) {
       rejected.push_back(std::move(fix.verdict));
       continue;
@@ -22,8 +22,8 @@ std::vector<FixVerdict> FixQueue::validate(const LocalFrame& frame) {
   return rejected;
 }
 
-SanitizedFix FixQueue::pop() {
-  SanitizedFix fix = std::move(validated_.front());
+ValidatedFix FixQueue::pop() {
+  ValidatedFix fix = std::move(validated_.front());
   validated_.pop_front();
   return fix;
 }

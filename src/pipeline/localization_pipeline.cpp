@@ -140,7 +140,7 @@ void LocalizationPipeline::add_bias(const BiasEstimate& bias) {
 }
 
 std::optional<BiasQuery> LocalizationPipeline::bias_query() const {
-  const SanitizedFix* next = fixes_.next();
+  const ValidatedFix* next = fixes_.next();
   if (!initialized() || !localizer_->wants_bias() || next == nullptr || history_.empty()) return std::nullopt;
   const auto predicted = predicted_antenna(next->fix.stamp);
   if (!predicted) return std::nullopt;
@@ -172,12 +172,12 @@ void LocalizationPipeline::process_fixes() {
 }
 
 bool LocalizationPipeline::process_next_fix() {
-  const SanitizedFix* next = fixes_.next();
+  const ValidatedFix* next = fixes_.next();
   if (next == nullptr || history_.empty() || next->fix.stamp > history_.latest()) return false;
   const bool is_too_old = next->fix.stamp < history_.oldest();
   if (!is_too_old && initialized() && awaits_more(next->fix.stamp)) return false;
 
-  const SanitizedFix fix = fixes_.pop();
+  const ValidatedFix fix = fixes_.pop();
   if (is_too_old) {
     decide_stale(fix.verdict, "older than the odometry that is remembered");
     return true;
@@ -202,14 +202,14 @@ bool LocalizationPipeline::awaits_more(Stamp fix) const {
          (localizer_->wants_bias() && biases_.awaits(fix, waited_s));
 }
 
-void LocalizationPipeline::start_with(const SanitizedFix& fix) {
+void LocalizationPipeline::start_with(const ValidatedFix& fix) {
   satellites_.take(fix.fix.stamp);
   const auto start = start_.find_start(with_odometry(fix.fix));
   decide_unexamined(fix, "used for the start", start.has_value());
   if (start) start_from(*start);
 }
 
-bool LocalizationPipeline::restart_with(const SanitizedFix& fix) {
+bool LocalizationPipeline::restart_with(const ValidatedFix& fix) {
   const auto start = start_.find_restart(with_odometry(fix.fix), *predicted_antenna(fix.fix.stamp), events_);
   if (!start) return false;
   decide_unexamined(fix, start->fix_use, true);
@@ -227,7 +227,7 @@ std::optional<BiasEstimate> LocalizationPipeline::take_bias(Stamp fix) {
   return bias;
 }
 
-void LocalizationPipeline::correct_with(const SanitizedFix& fix) {
+void LocalizationPipeline::correct_with(const ValidatedFix& fix) {
   const Stamp stamp = fix.fix.stamp;
   FixMeasurement measurement;
   measurement.position = fix.fix.position;
@@ -253,7 +253,7 @@ void LocalizationPipeline::decide_stale(FixVerdict verdict, const std::string& r
   decide(std::move(verdict));
 }
 
-void LocalizationPipeline::decide_unexamined(const SanitizedFix& fix, const std::string& reason, bool is_start) {
+void LocalizationPipeline::decide_unexamined(const ValidatedFix& fix, const std::string& reason, bool is_start) {
   FixVerdict verdict = fix.verdict;
   verdict.decision = FixDecision::kNotExamined;
   verdict.reason = reason;

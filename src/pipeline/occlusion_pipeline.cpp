@@ -5,23 +5,10 @@
 #include <limits>
 #include <utility>
 
-#include "urban_gnss_localization/geometry/angles.hpp"
+#include "urban_gnss_localization/geometry/isometry.hpp"
 
 namespace urban_gnss {
 namespace {
-
-Eigen::Isometry3d to_isometry(const Pose2& pose) {
-  Eigen::Isometry3d isometry = Eigen::Isometry3d::Identity();
-  isometry.translate(Eigen::Vector3d(pose.x, pose.y, 0.0));
-  isometry.rotate(Eigen::AngleAxisd(pose.yaw, Eigen::Vector3d::UnitZ()));
-  return isometry;
-}
-
-/// Also one that is not tracked is looked at: that it is blocked explains why.
-bool has_direction(const SatelliteObservation& satellite) {
-  return std::isfinite(satellite.look.azimuth_rad) && satellite.look.elevation_rad > 0.0 &&
-         satellite.look.elevation_rad <= 0.5 * kPi + 1e-6;
-}
 
 void append(std::string& text, const std::string& more) { text += (text.empty() ? "" : ", ") + more; }
 
@@ -43,17 +30,6 @@ const char* to_string(CloudDecision decision) {
 
 void OcclusionParameters::check(std::vector<std::string>& faults) const {
   if (antenna_offset.size() != 3) faults.push_back("antenna_offset: must be x, y and z (m)");
-}
-
-void OcclusionPipelineParameters::check(std::vector<std::string>& faults) const {
-  occlusion.check(faults);
-  visibility.check(faults);
-  local_map.check(faults);
-  voxels.check(faults);
-  aligner.check(faults);
-  voxel_tracer.check(faults);
-  covariance.check(faults);
-  consistency.check(faults);
 }
 
 OcclusionPipeline::OcclusionPipeline(const OcclusionPipelineParameters& parameters)
@@ -183,7 +159,7 @@ FixAssessment OcclusionPipeline::assess(Stamp stamp, const std::optional<Eigen::
     assessment.antenna = *antenna;
     for (std::size_t i = 0; i < assessment.satellites.size(); ++i) {
       SatelliteObservation& satellite = assessment.satellites[i];
-      if (!has_direction(satellite)) continue;
+      if (!has_direction(satellite)) continue;  // one that is not tracked is looked at: the map says why
       assessment.visibilities[i] = assess_visibility(tracer(), local_map_.map().observed_space(), *antenna,
                                                      satellite.look, epoch->angle_resolution_rad, sampling_);
       satellite.blocked_fraction = assessment.visibilities[i].blocked_fraction;

@@ -34,7 +34,7 @@ YAML::Node private_parameters(const ros::NodeHandle& private_node) {
 }
 
 ParameterReader private_parameter_reader(const ros::NodeHandle& private_node) {
-  ParameterReader reader(private_parameters(private_node));
+  ParameterReader reader(private_parameters(private_node), "", "", Layout::kTiered);
   reader.ignore("diagnostic_period");  // diagnostic_updater's own
   return reader;
 }

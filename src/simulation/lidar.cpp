@@ -213,7 +213,7 @@ void Lidar::end_sweep(double time_s, LidarScan& scan) {
   const Pose2 end = compose(lines_.back().odometry, mount);
   std::size_t i = 0;
   for (const SweepLine& line : lines_) {
-    const Pose2 to_end = between(end, compose(line.odometry, mount));
+    const Pose2 to_end = relative_pose(end, compose(line.odometry, mount));
     const double c = std::cos(to_end.yaw);
     const double s = std::sin(to_end.yaw);
     for (; i < line.end; ++i) {

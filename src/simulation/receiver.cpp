@@ -33,7 +33,6 @@ Eigen::Vector3d draw_vector(RandomEngine& engine) {
 }  // namespace
 
 void ReceiverParameters::check(std::vector<std::string>& faults) const {
-  channel.check(faults);
   if (!(latency_min <= latency_max)) faults.push_back("latency_min: must be at most latency_max");
 }
 

@@ -9,6 +9,8 @@
 
 #include "scenario_nodes.hpp"
 #include "urban_gnss_localization/geometry/local_frame.hpp"
+#include "urban_gnss_localization/parameters/assignment.hpp"
+#include "urban_gnss_localization/parameters/parameter_reader.hpp"
 #include "urban_gnss_localization/simulation/scenario_world.hpp"
 
 namespace urban_gnss {
@@ -20,15 +22,14 @@ struct Header {
   std::string start_time{"2026-05-04T09:30:00Z"};
   int seed{1};
   double duration{0.0};
-  std::vector<double> start;  ///< empty: on the route's first waypoint, towards the next
+  std::vector<double> start;
 
-  template <class V>
-  void visit(V& v) {
-    v("datum", datum);
-    v("start_time", start_time);
-    v("seed", seed, non_negative());
-    v("duration", duration, non_negative());
-    v("start", start);
+  void visit(ParameterVisitor& v) {
+    v("datum", datum, "", "");
+    v("start_time", start_time, "");
+    v("seed", seed, non_negative(), "", "");
+    v("duration", duration, non_negative(), "", "");
+    v("start", start, "", "empty: on the route's first waypoint, towards the next");
   }
   void check(std::vector<std::string>& faults) const {
     if (datum.size() != 3) {
@@ -48,21 +49,19 @@ struct Header {
 struct CarFields {
   double speed{CarParameters().speed_mps};
   double phase{0.0};
-  int count{1};  ///< cars evenly along the loop
+  int count{1};
   double length{CarParameters().length_m};
   double width{CarParameters().width_m};
   double height{CarParameters().height_m};
 
-  template <class V>
-  void visit(V& v) {
-    v("speed", speed, any_number());
-    v("phase", phase, any_number());
-    v("count", count, between(1.0, 1000.0));
-    v("length", length, positive());
-    v("width", width, positive());
-    v("height", height, positive());
+  void visit(ParameterVisitor& v) {
+    v("speed", speed, any_number(), "", "");
+    v("phase", phase, any_number(), "", "");
+    v("count", count, between(1.0, 1000.0), "", "cars evenly along the loop");
+    v("length", length, positive(), "", "");
+    v("width", width, positive(), "", "");
+    v("height", height, positive(), "", "");
   }
-  void check(std::vector<std::string>&) const {}
 };
 
 class ScenarioReader {
@@ -129,9 +128,9 @@ class ScenarioReader {
     ParameterReader reader(top_.child("route"), file_, "route.");
     double speed = RouteWaypoint().speed_mps;
     std::string track;
-    reader("loop", scenario_.route.loop);
-    reader("speed", speed, positive());
-    reader("track", track);
+    reader("loop", scenario_.route.loop, "the route begins anew at its end");
+    reader("speed", speed, positive(), "m/s", "until a waypoint gives another");
+    reader("track", track, "file of a recorded drive");
     const YAML::Node waypoints = reader.child("waypoints");
     if (track.empty() == waypoints.IsNull()) {
       reader.fault("waypoints", "a route needs either waypoints or a track");
@@ -168,8 +167,8 @@ class ScenarioReader {
       if (node.IsMap()) {
         ParameterReader entry(node, file_, "route." + name + ".");
         place = point_of(entry.child("at"));
-        entry("speed", speed_mps, positive());
-        entry("stop", waypoint.stop_s, non_negative());
+        entry("speed", speed_mps, positive(), "m/s", "from here on");
+        entry("stop", waypoint.stop_s, non_negative(), "s", "to stand here");
         reader.add(entry.finish());
       }
       if (!place) {
@@ -246,32 +245,6 @@ class ScenarioReader {
   Scenario scenario_;
 };
 
-/// Puts "a.b=value" over the map. A scalar is set as text, which has no place in a file that a fault could name.
-void put(YAML::Node root, const std::string& text) {
-  const auto equal = text.find('=');
-  const std::string name = equal == std::string::npos ? "" : text.substr(0, equal);
-  const auto dot = name.find('.');
-  if (name.empty() || dot == 0 || dot == name.size() - 1) {
-    throw std::runtime_error(text + ": must be NAME=VALUE or SECTION.NAME=VALUE");
-  }
-  YAML::Node value;
-  try {
-    value = YAML::Load(text.substr(equal + 1));
-  } catch (const YAML::Exception& error) {
-    throw std::runtime_error(text + ": " + error.what());
-  }
-  if (value.IsScalar()) value = YAML::Node(value.Scalar());
-  if (dot == std::string::npos) {
-    root[name] = value;
-    return;
-  }
-  YAML::Node section = root[name.substr(0, dot)];
-  if (section.IsDefined() && !section.IsNull() && !section.IsMap()) {
-    throw std::runtime_error(text + ": " + name.substr(0, dot) + " is no section");
-  }
-  section[name.substr(dot + 1)] = value;
-}
-
 }  // namespace
 
 Stamp parse_utc(const std::string& text) {
@@ -295,16 +268,9 @@ Stamp parse_utc(const std::string& text) {
 }
 
 Scenario load_scenario(const std::string& file, const std::vector<std::string>& overrides) {
-  YAML::Node root;
-  try {
-    root = YAML::LoadFile(file);
-  } catch (const YAML::BadFile&) {
-    throw std::runtime_error(file + ": cannot be read");
-  } catch (const YAML::ParserException& error) {
-    throw std::runtime_error(file + ":" + std::to_string(error.mark.line + 1) + ": " + error.msg);
-  }
-  if (!root.IsMap()) throw std::runtime_error(file + ": must be a map of names to values");
-  for (const std::string& text : overrides) put(root, text);
+  const YAML::Node root = load_map(file);
+  if (root.size() == 0) throw std::runtime_error(file + ": must be a map of names to values");
+  for (const std::string& text : overrides) assign(root, text);
   return ScenarioReader(root, file).read();
 }
 

@@ -5,7 +5,7 @@
 #include <sstream>
 
 #include "scenario_nodes.hpp"
-#include "urban_gnss_localization/common/parameters.hpp"
+#include "urban_gnss_localization/parameters/parameter_reader.hpp"
 #include "urban_gnss_localization/common/random.hpp"
 #include "urban_gnss_localization/simulation/polygon.hpp"
 
@@ -23,14 +23,13 @@ struct BuildingFields {
   double roof{0.0};
   double reflection_loss{Building().reflection_loss_db};
 
-  template <class V>
-  void visit(V& v) {
+  void visit(ParameterVisitor& v) {
     if (has_own_roof) {
-      v("name", name);
-      v("roof", roof, any_number());
+      v("name", name, "of the building");
+      v("roof", roof, any_number(), "m", "height of the roof above the ground");
     }
-    v("base", base, any_number());
-    v("reflection_loss", reflection_loss, non_negative());
+    v("base", base, any_number(), "m", "height at which it begins");
+    v("reflection_loss", reflection_loss, non_negative(), "dB", "that a reflection costs");
   }
   void check(std::vector<std::string>& faults) const {
     if (has_own_roof && !(roof > base)) faults.push_back("roof: must be given, and higher than base");
@@ -44,13 +43,12 @@ struct TreeFields {
   double crown_top{Tree().crown_top_m};
   double attenuation{Tree().attenuation_db_per_m};
 
-  template <class V>
-  void visit(V& v) {
-    v("trunk_radius", trunk_radius, non_negative());
-    v("crown_radius", crown_radius, non_negative());
-    v("crown_base", crown_base, non_negative());
-    v("crown_top", crown_top, positive());
-    v("attenuation", attenuation, non_negative());
+  void visit(ParameterVisitor& v) {
+    v("trunk_radius", trunk_radius, non_negative(), "m", "of the trunk");
+    v("crown_radius", crown_radius, non_negative(), "m", "of the crown");
+    v("crown_base", crown_base, non_negative(), "m", "height at which the crown begins");
+    v("crown_top", crown_top, positive(), "m", "height at which it ends");
+    v("attenuation", attenuation, non_negative(), "dB/m", "of a signal through the crown");
   }
   void check(std::vector<std::string>& faults) const {
     if (!(crown_top > crown_base)) faults.push_back("crown_top: must be higher than crown_base");
@@ -150,7 +148,7 @@ Polygon read_box(Entry& entry) {
   double yaw = 0.0;
   read_pair(box, "center", Need::kRequired, any_number(), center);
   read_pair(box, "size", Need::kRequired, positive(), size);
-  box("yaw", yaw, any_number());
+  box("yaw", yaw, any_number(), "rad", "counter-clockwise from east");
   entry.add(box.finish());
   const Eigen::Vector2d along = 0.5 * size.x() * Eigen::Vector2d(std::cos(yaw), std::sin(yaw));
   const Eigen::Vector2d across = 0.5 * size.y() * Eigen::Vector2d(-std::sin(yaw), std::cos(yaw));
@@ -185,8 +183,10 @@ std::vector<Building> read_grid(Entry& entry, const BuildingFields& fields) {
   const bool has_blocks = read_whole_pair(reader, "blocks", between(1.0, kMostEntries), grid.blocks);
   read_pair(reader, "block_size", optional, positive(), grid.block_size);
   read_pair(reader, "street_width", optional, non_negative(), grid.street_width);
-  reader("buildings_per_side", grid.buildings_per_side, between(1.0, 100.0));
-  reader("seed", grid.seed, non_negative());
+  reader("buildings_per_side", grid.buildings_per_side, between(1.0, 100.0), "", "of a block");
+  int seed = static_cast<int>(grid.seed);
+  reader("seed", seed, non_negative(), "", "of the heights");
+  grid.seed = static_cast<std::uint64_t>(seed);
   const bool has_heights = read_pair(reader, "heights", optional, positive(), grid.heights);
   if (has_heights && grid.heights.x() > grid.heights.y()) reader.fault("heights", "must be [lowest, highest]");
   if (has_heights && !(grid.heights.x() > fields.base)) reader.fault("heights", "must be higher than base");
@@ -200,7 +200,7 @@ std::vector<Building> read_grid(Entry& entry, const BuildingFields& fields) {
 
 std::vector<Building> read_table(Entry& entry, const BuildingFields& fields) {
   std::string file;
-  entry.reader("file", file);
+  entry.reader("file", file, "table of buildings");
   const auto path = std::filesystem::path(entry.source).parent_path() / file;
   if (!std::filesystem::is_regular_file(path)) {
     entry.reader.fault("file", "'" + path.string() + "' is not there");
@@ -256,7 +256,7 @@ std::vector<Eigen::Vector2d> read_row(Entry& entry) {
   double spacing = 8.0;
   read_pair(row, "from", Need::kRequired, any_number(), from);
   read_pair(row, "to", Need::kRequired, any_number(), to);
-  row("spacing", spacing, positive());
+  row("spacing", spacing, positive(), "m", "from trunk to trunk");
   const double length = (to - from).norm();
   // The last tree stands at `to` where the spacing divides the length, whatever the rounding.
   const double intervals = std::floor(length / spacing + 1e-9);

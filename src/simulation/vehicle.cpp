@@ -3,13 +3,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "urban_gnss_localization/motion/standstill.hpp"
+
 namespace urban_gnss {
 namespace {
 
 constexpr std::uint64_t kActuationStream = 201;
-
-/// Below this commanded speed a bicycle's curvature is not defined.
-constexpr double kStandstill_mps = 1e-3;
 
 double approach(double value, double target, double largest_change) {
   return value + std::clamp(target - value, -largest_change, largest_change);

@@ -52,7 +52,6 @@ std::uint8_t path_class(PathClass value) {
 }  // namespace
 
 void SimulationFrames::check(std::vector<std::string>& faults) const {
-  base.check(faults);
   if (gps.empty()) faults.push_back("gps_frame: must not be empty");
   if (imu.empty()) faults.push_back("imu_frame: must not be empty");
   if (lidar.empty()) faults.push_back("lidar_frame: must not be empty");

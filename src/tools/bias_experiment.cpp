@@ -3,7 +3,6 @@
 
 #include "urban_gnss_localization/experiments/bias_experiment.hpp"
 
-#include <CLI/CLI.hpp>
 #include <array>
 #include <chrono>
 #include <cmath>
@@ -15,6 +14,7 @@
 #include <sstream>
 #include <thread>
 
+#include "command_line.hpp"
 #include "find_scenario.hpp"
 #include "output_file.hpp"
 #include "overrides.hpp"
@@ -39,7 +39,7 @@ struct Options {
   std::vector<std::string> scenario_overrides;
   std::string json_file;
   std::string plots;
-  int jobs = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+  int jobs = 1;
 };
 
 nlohmann::json contestant_json(const std::vector<BiasRun>& runs, std::size_t contestant) {
@@ -184,7 +184,7 @@ void write_series(const fs::path& directory, const BiasRun& run) {
 
 void run_all(const Options& options, const std::string& command) {
   BiasExperimentConditions conditions;
-  read_overrides("--set", {}, options.overrides, conditions.filter, conditions.localization);
+  read_overrides("--set", YAML::Node(YAML::NodeType::Map), options.overrides, conditions.filter, conditions.localization);
   const auto seeds = static_cast<std::size_t>(options.seeds);
   std::vector<std::vector<BiasRun>> results(options.scenarios.size(), std::vector<BiasRun>(seeds));
   const auto start = std::chrono::steady_clock::now();
@@ -225,26 +225,12 @@ void run_all(const Options& options, const std::string& command) {
 
 int main(int argc, char** argv) {
   Options options;
-  CLI::App app("Figure 6 of Kim et al. on simulated scenarios: every filter on the same measurements.");
-  app.option_defaults()->always_capture_default();
-  app.add_option("--scenarios", options.scenarios, "files, or names of the package's; comma-separated")->delimiter(',');
-  app.add_option("--seeds", options.seeds, "how many seeds")->check(CLI::PositiveNumber);
-  app.add_option("--first-seed", options.first_seed, "the first of them")->check(CLI::NonNegativeNumber);
-  app.add_option("--set", options.overrides,
-                 "a parameter of complementary_ekf or localization, NAME=VALUE; repeatable");
-  app.add_option("--scenario-set", options.scenario_overrides,
-                 "a value of the scenario, SECTION.NAME=VALUE; repeatable");
-  app.add_option("--json", options.json_file, "write the metrics here");
-  app.add_option("--plots", options.plots, "write figure, table and their data into this folder");
-  app.add_option("--jobs", options.jobs, "threads")->check(CLI::PositiveNumber);
-  CLI11_PARSE(app, argc, argv);
-  std::string command = "rosrun urban_gnss_localization bias_experiment";
-  for (int i = 1; i < argc; ++i) command += std::string(" ") + argv[i];
-  try {
-    run_all(options, command);
-  } catch (const std::exception& error) {
-    std::cerr << "bias_experiment: " << error.what() << '\n';
-    return 1;
-  }
-  return 0;
+  CommandLine line("bias_experiment", "Figure 6 of Kim et al. on simulated scenarios: every filter on the same measurements.");
+  line.add_scenarios(options.scenarios, options.scenario_overrides);
+  line.add_seeds(options.seeds, options.first_seed);
+  line.add_set("--set", options.overrides, "a parameter of complementary_ekf or localization");
+  line.add_json(options.json_file);
+  line.app().add_option("--plots", options.plots, "write figure, table and their data into this folder");
+  line.add_jobs(options.jobs);
+  return line.run(argc, argv, [&] { run_all(options, line.command()); });
 }

@@ -1,7 +1,6 @@
 // Compares the verdicts of a ray tracer over a point cloud with those of a table: an exact cast at the polygons of the
 // buildings, and published labels.
 
-#include <CLI/CLI.hpp>
 #include <chrono>
 #include <cmath>
 #include <exception>
@@ -16,6 +15,7 @@
 #include <utility>
 #include <vector>
 
+#include "command_line.hpp"
 #include "csv_table.hpp"
 #include "output_file.hpp"
 #include "urban_gnss_localization/geometry/angles.hpp"
@@ -226,36 +226,25 @@ void check_visibility(const Options& options) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("Compares a ray tracer's verdicts over a point cloud with a table of exact ones");
   Options options;
+  CommandLine line("check_visibility", "Compares a ray tracer's verdicts over a point cloud with a table of exact ones.");
+  CLI::App& app = line.app();
   app.add_option("--map", options.map, "point cloud of the surroundings (.pcd)")->required()->check(CLI::ExistingFile);
   app.add_option(
          "--table", options.table,
          "CSV with stamp, x, y, z (m, antenna), az, el (rad), blocked_by_model, and if known mask_el, label_nlos")
       ->required()
       ->check(CLI::ExistingFile);
-  app.add_option("--json", options.json, "file for the result");
+  line.add_json(options.json);
   app.add_option("--tracer", options.tracer,
-                 "voxel (default), kdtree (Algorithm 2, fixed radius) or kdtree_growing (the paper's growing radius)")
+                 "voxel, kdtree (Algorithm 2, fixed radius) or kdtree_growing (the paper's growing radius)")
       ->check(CLI::IsMember({"voxel", "kdtree", "kdtree_growing"}));
-  app.add_option("--resolution", options.spacing_m, "spacing of the cloud's points, m (default: the cloud's own)")
+  app.add_option("--resolution", options.spacing_m, "spacing of the cloud's points, m; default: the cloud's own")
       ->check(CLI::Range(0.01, 100.0));
   app.add_option("--thin", options.thin_m, "keep one point of the map in each cube of this edge, m")
       ->check(CLI::Range(0.01, 100.0));
-  app.add_option("--min-range", options.min_range_m, "nearer is no obstacle, m (default 1)")
-      ->check(CLI::Range(0.0, 100.0));
-  app.add_option("--max-range", options.max_range_m, "m (default 500)")->check(CLI::Range(100.0, 1e5));
+  app.add_option("--min-range", options.min_range_m, "nearer is no obstacle, m")->check(CLI::Range(0.0, 100.0));
+  app.add_option("--max-range", options.max_range_m, "farther is none, m")->check(CLI::Range(100.0, 1e5));
   app.add_flag("--compare", options.compare, "trace with all tracers, and tell how far they agree");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 1;
-  }
-  try {
-    check_visibility(options);
-  } catch (const std::exception& error) {
-    std::cerr << "check_visibility: " << error.what() << '\n';
-    return 1;
-  }
-  return 0;
+  return line.run(argc, argv, [&] { check_visibility(options); });
 }

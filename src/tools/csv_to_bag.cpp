@@ -8,7 +8,6 @@
 #include <tf2_msgs/TFMessage.h>
 #include <urban_gnss_localization/SatelliteArray.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
 #include <exception>
@@ -24,6 +23,7 @@
 #include <string>
 #include <vector>
 
+#include "command_line.hpp"
 #include "bag_contents.hpp"
 #include "csv_table.hpp"
 #include "urban_gnss_localization/geometry/angles.hpp"
@@ -338,33 +338,26 @@ void convert(const fs::path& folder, const std::string& gnss_file, const Odometr
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("Makes a bag out of a folder of recorded CSV files");
   std::string folder;
   std::string output;
   std::string gnss_file = "gnss.csv";
   OdometryNoise noise;
-  app.add_option("DIR", folder,
-                 "folder with meta.json, odom.csv and the fixes; sats.csv, gnss_vel.csv, imu.csv and "
-                 "truth.csv are used where present")
+  CommandLine line("csv_to_bag", "Makes a bag out of a folder of recorded CSV files.");
+  line.app()
+      .add_option("DIR", folder,
+                  "folder with meta.json, odom.csv and the fixes; sats.csv, gnss_vel.csv, imu.csv and truth.csv are used "
+                  "where present")
       ->required();
-  app.add_option("OUT", output, "bag to write")->required();
-  app.add_option("--gnss-file", gnss_file, "file in DIR with the fixes (default gnss.csv)");
-  app.add_option("--speed-sigma", noise.speed_mps, "declared noise of the odometry's speed, m/s (default 0.05)")
+  line.app().add_option("OUT", output, "bag to write")->required();
+  line.app().add_option("--gnss-file", gnss_file, "file in DIR with the fixes");
+  line.app()
+      .add_option("--speed-sigma", noise.speed_mps, "declared noise of the odometry's speed, m/s")
       ->check(CLI::Range(1e-6, 1e6));
-  app.add_option("--speed-share", noise.speed_share, "the same as a share of the speed (default 0.02)")
+  line.app()
+      .add_option("--speed-share", noise.speed_share, "the same as a share of the speed")
       ->check(CLI::Range(0.0, 1.0));
-  app.add_option("--yaw-rate-sigma", noise.yaw_rate_rad_s, "declared noise of its yaw rate, rad/s (default 0.01)")
+  line.app()
+      .add_option("--yaw-rate-sigma", noise.yaw_rate_rad_s, "declared noise of its yaw rate, rad/s")
       ->check(CLI::Range(1e-6, 1e6));
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 1;
-  }
-  try {
-    convert(folder, gnss_file, noise, output);
-  } catch (const std::exception& error) {
-    std::cerr << "csv_to_bag: " << error.what() << '\n';
-    return 1;
-  }
-  return 0;
+  return line.run(argc, argv, [&] { convert(folder, gnss_file, noise, output); });
 }

@@ -5,7 +5,6 @@
 #include <rosbag/view.h>
 #include <sensor_msgs/NavSatFix.h>
 
-#include <CLI/CLI.hpp>
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -23,6 +22,7 @@
 #include <string>
 #include <vector>
 
+#include "command_line.hpp"
 #include "output_file.hpp"
 #include "urban_gnss_localization/evaluation/report_json.hpp"
 #include "urban_gnss_localization/evaluation/stamp_text.hpp"
@@ -316,37 +316,29 @@ void evaluate(const Options& options) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("Scores estimates and raw fixes in bags against ground truth");
   Options options;
   bool no_plots = false;
+  CommandLine line("evaluate", "Scores estimates and raw fixes in bags against ground truth.");
+  CLI::App& app = line.app();
   app.add_option("BAG", options.bags, "bags to evaluate")->required()->check(CLI::ExistingFile);
   app.add_option("--output", options.output, "folder for metrics.json, data/, trajectories and plots")->required();
-  app.add_option("--truth", options.truth_bag, "bag with the ground truth (default: each bag's own)")
+  app.add_option("--truth", options.truth_bag, "bag with the ground truth; default: each bag's own")
       ->check(CLI::ExistingFile);
-  app.add_option("--truth-topic", options.truth_topic, "nav_msgs/Odometry (default ground_truth/odom)");
+  app.add_option("--truth-topic", options.truth_topic, "nav_msgs/Odometry");
   CLI::Option* estimate_topic =
       app.add_option("--estimate-topic", options.estimate_topics,
-                     "nav_msgs/Odometry, may be given several times (default odometry/filtered)");
+                     "nav_msgs/Odometry, may be given several times; default: odometry/filtered");
 #if CLI11_VERSION_MAJOR >= 2
   estimate_topic->allow_extra_args(false);  // one topic each, so that a bag may follow it
 #else
   static_cast<void>(estimate_topic);  // Ubuntu 20.04's CLI11 cannot: there the bags come first
 #endif
-  app.add_option("--fix-topic", options.fix_topic, "sensor_msgs/NavSatFix (default gps/fix)");
-  app.add_option("--max-gap", options.max_gap_s, "longest time over which an estimate is interpolated, s (default 1)")
+  app.add_option("--fix-topic", options.fix_topic, "sensor_msgs/NavSatFix");
+  app.add_option("--max-gap", options.max_gap_s, "longest time over which an estimate is interpolated, s")
       ->check(CLI::Range(1e-3, 1e6));
   app.add_flag("--no-plots", no_plots, "write no plots");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 1;
-  }
-  options.plots = !no_plots;
-  try {
+  return line.run(argc, argv, [&] {
+    options.plots = !no_plots;
     evaluate(options);
-  } catch (const std::exception& error) {
-    std::cerr << "evaluate: " << error.what() << '\n';
-    return 1;
-  }
-  return 0;
+  });
 }

@@ -23,6 +23,7 @@
 #include "urban_gnss_localization/localizers/switching/switching_particle_filter.hpp"
 #include "urban_gnss_localization/localizers/maier/ukf.hpp"
 #include "urban_gnss_localization/geometry/angles.hpp"
+#include "urban_gnss_localization/parameters/parameter_reader.hpp"
 
 namespace fs = std::filesystem;
 using namespace urban_gnss;

@@ -3,7 +3,6 @@
 
 #include "urban_gnss_localization/experiments/occlusion_experiment.hpp"
 
-#include <CLI/CLI.hpp>
 #include <Eigen/LU>
 #include <chrono>
 #include <cmath>
@@ -15,6 +14,7 @@
 #include <sstream>
 #include <thread>
 
+#include "command_line.hpp"
 #include "find_scenario.hpp"
 #include "occlusion_series.hpp"
 #include "output_file.hpp"
@@ -23,6 +23,7 @@
 #include "urban_gnss_localization/evaluation/report_json.hpp"
 #include "urban_gnss_localization/evaluation/statistics.hpp"
 #include "urban_gnss_localization/geometry/angles.hpp"
+#include "urban_gnss_localization/parameters/parameter_reader.hpp"
 
 namespace fs = std::filesystem;
 using namespace urban_gnss;
@@ -43,7 +44,7 @@ struct Options {
   std::vector<std::string> scenario_overrides;
   std::string json_file;
   std::string series_directory;
-  int jobs = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+  int jobs = 1;
 };
 
 OcclusionExperimentConditions read_conditions(const Options& options) {
@@ -51,8 +52,9 @@ OcclusionExperimentConditions read_conditions(const Options& options) {
   const std::string file = options.occlusion_file.empty()
                                ? (package_path() / "config/occlusion_simulator.yaml").string()
                                : options.occlusion_file;
-  read_overrides(file + ", --set", YAML::LoadFile(file), options.occlusion_overrides, conditions.occlusion);
-  read_overrides("--ukf-set", YAML::Node(), options.ukf_overrides, conditions.ukf, conditions.motion,
+  read_overrides(file + ", --set", load_map(file), options.occlusion_overrides, conditions.occlusion);
+  WithMotion with_motion{conditions.ukf, conditions.motion};
+  read_overrides("--ukf-set", YAML::Node(YAML::NodeType::Map), options.ukf_overrides, with_motion,
                  conditions.localization);
   conditions.cloud_every = options.cloud_every;
   return conditions;
@@ -271,33 +273,20 @@ void run_all(const Options& options, const std::string& command) {
 
 int main(int argc, char** argv) {
   Options options;
-  CLI::App app("Tables I and II of Maier and Kleiner (2010) on simulated scenarios.");
-  app.option_defaults()->always_capture_default();
-  app.add_option("--scenarios", options.scenarios, "files, or names of the package's; comma-separated")->delimiter(',');
-  app.add_option("--seeds", options.seeds, "how many seeds")->check(CLI::PositiveNumber);
-  app.add_option("--first-seed", options.first_seed, "the first of them")->check(CLI::NonNegativeNumber);
-  app.add_option("--duration", options.duration_s, "s to simulate at most; default: the scenario's")
+  CommandLine line("occlusion_experiment", "Tables I and II of Maier and Kleiner (2010) on simulated scenarios.");
+  line.add_scenarios(options.scenarios, options.scenario_overrides);
+  line.add_seeds(options.seeds, options.first_seed);
+  line.add_duration(options.duration_s);
+  line.app()
+      .add_option("--cloud-every", options.cloud_every, "of a spinning lidar's scans, use one in so many")
       ->check(CLI::PositiveNumber);
-  app.add_option("--cloud-every", options.cloud_every, "of a spinning lidar's scans, use one in so many")
-      ->check(CLI::PositiveNumber);
-  app.add_option("--occlusion", options.occlusion_file,
-                 "parameters of the occlusion node; default: config/occlusion_simulator.yaml of the package");
-  app.add_option("--set", options.occlusion_overrides, "a parameter of the occlusion node, NAME=VALUE; repeatable");
-  app.add_option("--ukf-set", options.ukf_overrides, "a parameter of ukf or localization, NAME=VALUE; repeatable");
-  app.add_option("--scenario-set", options.scenario_overrides,
-                 "a value of the scenario, SECTION.NAME=VALUE; repeatable");
-  app.add_option("--json", options.json_file, "write the metrics here");
-  app.add_option("--series", options.series_directory,
-                 "write the first seed's fixes and trajectories here as CSV, for figures");
-  app.add_option("--jobs", options.jobs, "threads")->check(CLI::PositiveNumber);
-  CLI11_PARSE(app, argc, argv);
-  std::string command = "rosrun urban_gnss_localization occlusion_experiment";
-  for (int i = 1; i < argc; ++i) command += std::string(" ") + argv[i];
-  try {
-    run_all(options, command);
-  } catch (const std::exception& error) {
-    std::cerr << "occlusion_experiment: " << error.what() << '\n';
-    return 1;
-  }
-  return 0;
+  line.app().add_option("--occlusion", options.occlusion_file,
+                        "parameters of the occlusion node; default: config/occlusion_simulator.yaml of the package");
+  line.add_set("--set", options.occlusion_overrides, "a parameter of the occlusion node");
+  line.add_set("--ukf-set", options.ukf_overrides, "a parameter of ukf or localization");
+  line.add_json(options.json_file);
+  line.app().add_option("--series", options.series_directory,
+                        "write the first seed's fixes and trajectories here as CSV, for figures");
+  line.add_jobs(options.jobs);
+  return line.run(argc, argv, [&] { run_all(options, line.command()); });
 }

@@ -5,7 +5,6 @@
 #include <ros/package.h>
 #include <sys/utsname.h>
 
-#include <CLI/CLI.hpp>
 #include <array>
 #include <atomic>
 #include <chrono>
@@ -19,10 +18,15 @@
 #include <sstream>
 #include <thread>
 
+#include "command_line.hpp"
+#include "find_scenario.hpp"
 #include "output_file.hpp"
 #include "urban_gnss_localization/common/progress.hpp"
 #include "urban_gnss_localization/evaluation/report_json.hpp"
 #include "urban_gnss_localization/evaluation/statistics.hpp"
+#include "urban_gnss_localization/parameters/assignment.hpp"
+#include "urban_gnss_localization/parameters/parameter_list.hpp"
+#include "urban_gnss_localization/parameters/parameter_reader.hpp"
 #include "urban_gnss_localization/ros/plotting.hpp"
 
 namespace fs = std::filesystem;
@@ -45,7 +49,7 @@ struct Options {
   std::string json_file;
   std::string plots;
   bool open_loop = false;
-  int jobs = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+  int jobs = 1;
 };
 
 /// Errors of one run, and the positions of its curve.
@@ -59,34 +63,20 @@ struct RunErrors {
   double runtime_s = 0.0;
 };
 
-YAML::Node load_yaml(const fs::path& file) {
-  try {
-    return YAML::LoadFile(file.string());
-  } catch (const YAML::Exception& error) {
-    throw std::runtime_error(file.string() + ": " + error.what());
-  }
-}
-
 PaperExperimentConditions load_conditions(const Options& options) {
-  const fs::path directory = options.config.empty()
-                                 ? fs::path(ros::package::getPath("urban_gnss_localization")) / "config" / "paper_field"
-                                 : fs::path(options.config);
-  PaperFiles files;
-  for (const char* name : kPaperFileNames) files[name] = load_yaml(directory / (std::string(name) + ".yaml"));
+  const fs::path directory = options.config.empty() ? package_path() / "config" / "paper_field" : fs::path(options.config);
+  YAML::Node files;
+  for (const char* name : kPaperFileNames) files[name] = load_map((directory / (std::string(name) + ".yaml")).string());
   for (const std::string& text : options.overrides) {
-    const auto dot = text.find('.');
-    const auto equal = text.find('=');
-    if (dot == std::string::npos || equal == std::string::npos || dot > equal) {
-      throw std::runtime_error("--set " + text + ": must be FILE.NAME=VALUE, e.g. particle_filter.ring_share=0.01");
-    }
-    const auto file = files.find(text.substr(0, dot));
-    if (file == files.end()) throw std::runtime_error("--set " + text + ": no such file as " + text.substr(0, dot));
-    file->second[text.substr(dot + 1, equal - dot - 1)] = YAML::Load(text.substr(equal + 1));
+    const std::string file = text.substr(0, text.find_first_of(".="));
+    if (!files[file].IsDefined()) throw std::runtime_error("--set " + text + ": there is no file " + file + ".yaml");
+    assign(files, text);
   }
-  if (!options.bias_direction.empty()) files["simulator"]["bias_direction"] = options.bias_direction;
+  if (!options.bias_direction.empty()) assign(files, "simulator.bias_direction=" + options.bias_direction);
   if (options.noise_scale >= 0.0) {
-    files["simulator"]["odom_noise_scale"] = options.noise_scale;
-    files["particle_filter"]["odom_noise_scale"] = options.noise_scale;
+    for (const char* file : {"simulator", "particle_filter", "switching_particle_filter"}) {
+      files[file]["expert"]["motion"]["odom_noise_scale"] = options.noise_scale;
+    }
   }
   PaperExperimentConditions conditions = read_paper_conditions(files);
   conditions.laps = options.laps;
@@ -157,6 +147,7 @@ class TraceWriter {
 RunErrors run(const PaperMethod& method, PaperExperimentConditions conditions, int seed, TraceWriter* trace) {
   conditions.field.seed = seed;
   conditions.filter.seed = seed;
+  conditions.switching.seed = seed;
   RunErrors errors;
   const auto start = std::chrono::steady_clock::now();
   int k = 0;
@@ -315,18 +306,19 @@ void run_all(const Options& options, const std::string& command) {
   metrics["closed_loop"] = conditions.closed_loop;
   metrics["laps"] = options.laps;
   for (std::size_t s = 0; s < seeds; ++s) metrics["seeds"].push_back(options.first_seed + static_cast<int>(s));
-  const auto texts = [](const YAML::Node& map) {
+  const auto texts = [](const ParameterList& list) {
     nlohmann::json json;
-    for (const auto& entry : map) {
-      if (entry.second.IsScalar()) json[entry.first.as<std::string>()] = entry.second.as<std::string>();
+    for (const ListedParameter& each : list.parameters()) {
+      if (each.value.front() != '[') json[each.name] = each.value;
     }
     return json;
   };
   metrics["conditions"] = {
-      {"simulator", texts(ParameterWriter().write(conditions.field).write(conditions.field_motion).map())},
-      {"particle_filter", texts(ParameterWriter().write(conditions.filter).write(conditions.filter_motion).map())},
-      {"gps_bias", texts(ParameterWriter().write(conditions.bias).map())},
-      {"waypoint_controller", texts(ParameterWriter().write(conditions.controller).map())}};
+      {"simulator", texts(ParameterList().add(conditions.field).add(conditions.field_motion))},
+      {"particle_filter", texts(ParameterList().add(conditions.filter).add(conditions.filter_motion))},
+      {"switching_particle_filter", texts(ParameterList().add(conditions.switching).add(conditions.switching_motion))},
+      {"gps_bias", texts(ParameterList().add(conditions.bias))},
+      {"waypoint_controller", texts(ParameterList().add(conditions.controller))}};
   for (std::size_t m = 0; m < methods.size(); ++m) {
     metrics["method_order"].push_back(methods[m].name);
     metrics["methods"][methods[m].name] = method_json(methods[m], results[m]);
@@ -355,34 +347,26 @@ void run_all(const Options& options, const std::string& command) {
 int main(int argc, char** argv) {
   Options options;
   options.methods = {"paper", "conventional", "literal", "dead_reckoning", "oracle"};
-  CLI::App app("Monte Carlo of the simulation of Nishida et al. (2013), section 4: every method on the same noise.");
-  app.option_defaults()->always_capture_default();
-  app.add_option("--seeds", options.seeds, "how many seeds")->check(CLI::PositiveNumber);
-  app.add_option("--first-seed", options.first_seed, "the first of them")->check(CLI::NonNegativeNumber);
+  CommandLine line("paper_experiment", "Monte Carlo of the simulation of Nishida et al. (2013), section 4: every method on the same noise.");
+  CLI::App& app = line.app();
+  line.add_seeds(options.seeds, options.first_seed);
   app.add_option("--laps", options.laps, "rounds over the eight targets")->check(CLI::PositiveNumber);
   app.add_option("--noise-scale", options.noise_scale, "factor on the variances of eq. (5)-(7), robot and filters")
       ->check(CLI::NonNegativeNumber);
   app.add_option("--bias-direction", options.bias_direction, "where the bias points in the shadow")
       ->check(CLI::IsMember({"random", "negative_x"}));
   app.add_option("--methods", options.methods, "comma-separated, or 'all'")->delimiter(',');
-  app.add_option("--set", options.overrides, "another value of a configuration file, FILE.NAME=VALUE; repeatable");
-  app.add_option("--config", options.config, "folder of the four YAML files; default: config/paper_field");
-  app.add_option("--json", options.json_file, "write the metrics here");
+  line.add_set("--set", options.overrides, "FILE. and a parameter of a file in the folder of --config");
+  app.add_option("--config", options.config, "folder of the YAML files; default: config/paper_field");
+  line.add_json(options.json_file);
   app.add_option("--plots", options.plots, "write report, figures and their data into this folder");
   app.add_flag("--open-loop", options.open_loop, "steer on the truth instead of the estimate");
-  app.add_option("--jobs", options.jobs, "threads")->check(CLI::PositiveNumber);
-  CLI11_PARSE(app, argc, argv);
-  if (options.methods == std::vector<std::string>{"all"}) {
-    options.methods.clear();
-    for (const auto& method : paper_methods()) options.methods.push_back(method.name);
-  }
-  std::string command = "rosrun urban_gnss_localization paper_experiment";
-  for (int i = 1; i < argc; ++i) command += std::string(" ") + argv[i];
-  try {
-    run_all(options, command);
-  } catch (const std::exception& error) {
-    std::cerr << "paper_experiment: " << error.what() << '\n';
-    return 1;
-  }
-  return 0;
+  line.add_jobs(options.jobs);
+  return line.run(argc, argv, [&] {
+    if (options.methods == std::vector<std::string>{"all"}) {
+      options.methods.clear();
+      for (const auto& method : paper_methods()) options.methods.push_back(method.name);
+    }
+    run_all(options, line.command());
+  });
 }

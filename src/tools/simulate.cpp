@@ -4,7 +4,6 @@
 #include <rosbag/bag.h>
 #include <sensor_msgs/NavSatFix.h>
 
-#include <CLI/CLI.hpp>
 #include <chrono>
 #include <filesystem>
 #include <iomanip>
@@ -13,9 +12,11 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "command_line.hpp"
 #include "find_scenario.hpp"
 #include "output_file.hpp"
 #include "urban_gnss_localization/common/progress.hpp"
+#include "urban_gnss_localization/parameters/parameter_reader.hpp"
 #include "urban_gnss_localization/simulation_ros/simulation_messages.hpp"
 #include "urban_gnss_localization/simulation/city_simulator.hpp"
 #include "urban_gnss_localization/simulation/paper_field_simulator.hpp"
@@ -52,9 +53,10 @@ Run make_paper_field(const fs::path& file, const YAML::Node& values, const Optio
     throw std::runtime_error("--set: the paper's field takes none; copy " + file.string());
   PaperFieldParameters field;
   MotionParameters motion;
-  ParameterReader reader(values, file.string());
+  WithMotion with_motion{field, motion};
+  ParameterReader reader(values, file.string(), "", Layout::kTiered);
   reader.ignore("field");
-  reader.read(field).read(motion);
+  reader.read(with_motion);
   if (options.seed >= 0) field.seed = options.seed;
   const auto faults = reader.finish();
   if (!faults.empty()) throw ParameterError(file.string(), faults);
@@ -194,23 +196,15 @@ void run(const Options& options) {
 
 int main(int argc, char** argv) {
   Options options;
-  CLI::App app("Drives a scenario offline: a bag of what the sensors publish, and how the receiver did.");
-  app.option_defaults()->always_capture_default();
-  app.add_option("--scenario", options.scenario, "a scenario's file, or the name of one that comes with the package")
+  CommandLine line("simulate", "Drives a scenario offline: a bag of what the sensors publish, and how the receiver did.");
+  line.app()
+      .add_option("--scenario", options.scenario, "a scenario's file, or the name of one that comes with the package")
       ->required();
-  app.add_option("--output", options.output, "bag to write");
-  app.add_option("--json", options.json_file, "write how the receiver did here");
-  app.add_option("--seed", options.seed, "seed of all noise; default: the scenario's");
-  app.add_option("--duration", options.duration_s, "s to simulate; default: the scenario's")
-      ->check(CLI::PositiveNumber);
-  app.add_option("--set", options.overrides, "one value, SECTION.NAME=VALUE; repeatable");
-  app.add_flag("--without-lidar", options.without_lidar, "no scans, which take most of the time and of the bag");
-  CLI11_PARSE(app, argc, argv);
-  try {
-    run(options);
-  } catch (const std::exception& error) {
-    std::cerr << "simulate: " << error.what() << '\n';
-    return 1;
-  }
-  return 0;
+  line.app().add_option("--output", options.output, "bag to write");
+  line.add_json(options.json_file);
+  line.app().add_option("--seed", options.seed, "seed of all noise; default: the scenario's");
+  line.add_duration(options.duration_s);
+  line.app().add_option("--set", options.overrides, "one value, SECTION.NAME=VALUE; repeatable");
+  line.app().add_flag("--without-lidar", options.without_lidar, "no scans, which take most of the time and of the bag");
+  return line.run(argc, argv, [&] { run(options); });
 }

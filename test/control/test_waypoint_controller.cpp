@@ -6,6 +6,7 @@
 #include "matchers.hpp"
 #include "package_directory.hpp"
 #include "urban_gnss_localization/control/waypoint_controller.hpp"
+#include "urban_gnss_localization/parameters/parameter_reader.hpp"
 
 namespace urban_gnss {
 namespace {
@@ -84,11 +85,11 @@ TEST(WaypointController, WithoutTargetsItStandsStill) {
 
 TEST(WaypointController, HalfATargetIsAFault) {
   std::vector<std::string> faults;
-  square().check(faults);
+  faults = faults_of(square());
   EXPECT_TRUE(faults.empty());
   WaypointControllerParameters parameters;
   parameters.targets = {1.0, 2.0, 3.0};
-  parameters.check(faults);
+  faults = faults_of(parameters);
   EXPECT_EQ(faults.size(), 1u);
 }
 

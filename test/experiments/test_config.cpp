@@ -17,6 +17,7 @@
 #include "urban_gnss_localization/localizers/switching/imm_ekf.hpp"
 #include "urban_gnss_localization/localizers/nishida/particle_filter.hpp"
 #include "urban_gnss_localization/localizers/maier/ukf.hpp"
+#include "urban_gnss_localization/parameters/parameter_reader.hpp"
 #include "urban_gnss_localization/pipeline/bias_pipeline.hpp"
 #include "urban_gnss_localization/pipeline/localization_pipeline.hpp"
 #include "urban_gnss_localization/pipeline/occlusion_pipeline.hpp"

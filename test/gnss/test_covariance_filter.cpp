@@ -168,7 +168,7 @@ TEST(CovarianceFilter, ResetForgetsTheRun) {
   EXPECT_TRUE(filter.add(with_sigma(2.0)).is_good);
 }
 
-TEST(CovarianceFilter, EveryParameterHasAnEffectF36) {
+TEST(CovarianceFilter, EveryParameterHasAnEffect) {
   const std::vector<double> sigmas{2, 5, 2, 8, 8, 2, 2, 10, 10, 10, 10, 10, 10, 2, 2, 2, 2, 2};
   const auto outcome = [&](const CovarianceFilterParameters& p) {
     std::vector<double> values;
@@ -188,7 +188,7 @@ TEST(CovarianceFilter, ThresholdMustBeBelowInfinity) {
   CovarianceFilterParameters p;
   p.sigma_threshold = 700.0;
   std::vector<std::string> faults;
-  p.check(faults);
+  faults = faults_of(p);
   ASSERT_EQ(faults.size(), 1u);
   EXPECT_NE(faults[0].find("sigma_threshold"), std::string::npos);
 }

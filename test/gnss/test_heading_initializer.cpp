@@ -247,7 +247,7 @@ TEST(HeadingInitializer, NeedsFourFixesAndAWayOfTwoSigma) {
   EXPECT_TRUE(initializer.estimate()) << initializer.waiting_for();
 }
 
-TEST(HeadingInitializer, EveryParameterHasAnEffectF36) {
+TEST(HeadingInitializer, EveryParameterHasAnEffect) {
   std::mt19937_64 generator(9);
   Drive drive;
   std::vector<LocalFix> fixes;

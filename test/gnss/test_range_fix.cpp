@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "range_rig.hpp"
+#include "urban_gnss_localization/parameters/parameter_reader.hpp"
 
 namespace urban_gnss {
 namespace {
@@ -44,7 +45,7 @@ TEST(RangeFix, OfDirectRangesIsWeightedLeastSquares) {
     p.range_sigma = uniform_between(1.0, 7.0, engine);
     p.range_height_sigma = uniform_between(3.0, 100.0, engine);
     const Sky sky = noisy_sky(engine, p.range_sigma);
-    const auto fix = range_fix(sky, kFreeCn0, known_place({0.0, 0.0}, 50.0), p);
+    const auto fix = range_fix(sky, kNominalCn0, known_place({0.0, 0.0}, 50.0), p);
     ASSERT_TRUE(fix);
     const auto expected =
         DenseRanges(sky)
@@ -59,7 +60,7 @@ TEST(RangeFix, FindsTheAntennaWithTheDefaults) {
   const Eigen::Vector3d place(12.0, -7.0, 5.0);
   const Sky sky =
       with_ranges(two_constellations(), place, {{Constellation::kGps, 40.0}, {Constellation::kGalileo, -900.0}});
-  const auto fix = range_fix(sky, kFreeCn0, known_place({10.0, -5.0}, 10.0), {});
+  const auto fix = range_fix(sky, kNominalCn0, known_place({10.0, -5.0}, 10.0), {});
   ASSERT_TRUE(fix);
   EXPECT_LT((fix->offset - place.head<2>()).norm(), 0.3);
   EXPECT_LT(fix->covariance.trace(), 2.0 * 5.0 * 5.0);
@@ -71,16 +72,16 @@ TEST(RangeFix, ClocksAndOrderDoNotMatter) {
   sky[3].residual_m += 35.0;
   set_cn0(sky[3], 15.0);
   const RelativePlace known = known_place({3.0, 2.0}, 8.0);
-  const auto before = range_fix(sky, kFreeCn0, known, {});
+  const auto before = range_fix(sky, kNominalCn0, known, {});
   ASSERT_TRUE(before);
   for (const Constellation constellation : {Constellation::kGps, Constellation::kGalileo}) {
     Sky shifted = sky;
     for (SatelliteObservation& s : shifted) s.residual_m += s.id.constellation == constellation ? 777.0 : 0.0;
-    EXPECT_TRUE(same(*range_fix(shifted, kFreeCn0, known, {}), *before, 1e-6));
+    EXPECT_TRUE(same(*range_fix(shifted, kNominalCn0, known, {}), *before, 1e-6));
   }
   for (int round = 0; round < 10; ++round) {
     for (std::size_t i = sky.size(); i > 1; --i) std::swap(sky[i - 1], sky[engine() % i]);
-    EXPECT_TRUE(same(*range_fix(sky, kFreeCn0, known, {}), *before, 1e-9));
+    EXPECT_TRUE(same(*range_fix(sky, kNominalCn0, known, {}), *before, 1e-9));
   }
 }
 
@@ -88,12 +89,12 @@ TEST(RangeFix, IsTheLikelihoodWithoutWhatIsKnown) {
   RandomEngine engine = make_engine(103);
   const Sky sky = noisy_sky(engine, 3.0);
   // Judged alike: all direct, however far the known place is from that of the ranges.
-  const auto loose = range_fix(sky, kFreeCn0, known_place({0.0, 0.0}, 100.0), all_direct());
+  const auto loose = range_fix(sky, kNominalCn0, known_place({0.0, 0.0}, 100.0), all_direct());
   ASSERT_TRUE(loose);
   for (const Eigen::Vector2d& offset :
        {Eigen::Vector2d(0.0, 0.0), Eigen::Vector2d(60.0, 0.0), Eigen::Vector2d(-20.0, 50.0)}) {
     for (const double sigma : {0.0, 0.1, 10.0}) {
-      const auto fix = range_fix(sky, kFreeCn0, known_place(offset, sigma), all_direct());
+      const auto fix = range_fix(sky, kNominalCn0, known_place(offset, sigma), all_direct());
       ASSERT_TRUE(fix);
       EXPECT_TRUE(same(*fix, *loose, 1e-5)) << offset.transpose() << ", " << sigma;
     }
@@ -104,18 +105,18 @@ TEST(RangeFix, SatelliteAloneInItsConstellationChangesNothing) {
   RandomEngine engine = make_engine(104);
   Sky sky = noisy_sky(engine, 4.0);
   const RelativePlace known = known_place({0.0, 0.0}, 30.0);
-  const auto before = range_fix(sky, kFreeCn0, known, {});
+  const auto before = range_fix(sky, kNominalCn0, known, {});
   sky.push_back(satellite(7, 80, 45, Constellation::kBeidou));
   set_cn0(sky.back());
   sky.back().residual_m = 13.0;
-  EXPECT_TRUE(same(*range_fix(sky, kFreeCn0, known, {}), *before, 0.0));
+  EXPECT_TRUE(same(*range_fix(sky, kNominalCn0, known, {}), *before, 0.0));
   // With another of its clock it does.
   sky.push_back(satellite(8, 260, 30, Constellation::kBeidou));
   set_cn0(sky.back());
   sky.back().residual_m = -4.0;
-  EXPECT_FALSE(same(*range_fix(sky, kFreeCn0, known, {}), *before, 1e-3));
-  EXPECT_FALSE(range_fix({sky.front()}, kFreeCn0, known, {}));
-  EXPECT_FALSE(range_fix({sky.front(), sky.back()}, kFreeCn0, known, {}));
+  EXPECT_FALSE(same(*range_fix(sky, kNominalCn0, known, {}), *before, 1e-3));
+  EXPECT_FALSE(range_fix({sky.front()}, kNominalCn0, known, {}));
+  EXPECT_FALSE(range_fix({sky.front(), sky.back()}, kNominalCn0, known, {}));
 }
 
 TEST(RangeFix, SbasAndQzssHaveTheClockOfGps) {
@@ -128,12 +129,12 @@ TEST(RangeFix, SbasAndQzssHaveTheClockOfGps) {
   RandomEngine engine = make_engine(105);
   Sky sky = noisy_sky(engine, 4.0);
   const RelativePlace known = known_place({0.0, 0.0}, 30.0);
-  const auto expected = range_fix(sky, kFreeCn0, known, {});
+  const auto expected = range_fix(sky, kNominalCn0, known, {});
   sky[0].id = {Constellation::kQzss, 195};
   sky[1].id = {Constellation::kSbas, 137};
-  EXPECT_TRUE(same(*range_fix(sky, kFreeCn0, known, {}), *expected, 1e-9));
+  EXPECT_TRUE(same(*range_fix(sky, kNominalCn0, known, {}), *expected, 1e-9));
   // Two that are alone but for the clock that they share.
-  EXPECT_TRUE(range_fix({sky[0], sky[1]}, kFreeCn0, known, {}));
+  EXPECT_TRUE(range_fix({sky[0], sky[1]}, kNominalCn0, known, {}));
 }
 
 TEST(RangeFix, SatelliteCountsOnce) {
@@ -142,21 +143,21 @@ TEST(RangeFix, SatelliteCountsOnce) {
   const RelativePlace known = known_place({0.0, 0.0}, 30.0);
   Sky twice = sky;
   twice.insert(twice.end(), sky.begin(), sky.begin() + 5);
-  EXPECT_TRUE(same(*range_fix(twice, kFreeCn0, known, {}), *range_fix(sky, kFreeCn0, known, {}), 0.0));
-  EXPECT_FALSE(range_fix({sky[0], sky[0]}, kFreeCn0, known, {}));
+  EXPECT_TRUE(same(*range_fix(twice, kNominalCn0, known, {}), *range_fix(sky, kNominalCn0, known, {}), 0.0));
+  EXPECT_FALSE(range_fix({sky[0], sky[0]}, kNominalCn0, known, {}));
   // Of two signals, the one that can be used.
   twice = sky;
   twice.insert(twice.begin(), sky[2]);
   twice.front().residual_m = kNaN;
-  EXPECT_TRUE(same(*range_fix(twice, kFreeCn0, known, {}), *range_fix(sky, kFreeCn0, known, {}), 0.0));
+  EXPECT_TRUE(same(*range_fix(twice, kNominalCn0, known, {}), *range_fix(sky, kNominalCn0, known, {}), 0.0));
 }
 
 TEST(RangeFix, LeavesOutWhatCannotBeUsed) {
   RandomEngine engine = make_engine(107);
   const Sky sky = noisy_sky(engine, 4.0);
   const RelativePlace known = known_place({0.0, 0.0}, 30.0);
-  const auto without_first = range_fix({sky.begin() + 1, sky.end()}, kFreeCn0, known, {});
-  const auto with_all = range_fix(sky, kFreeCn0, known, {});
+  const auto without_first = range_fix({sky.begin() + 1, sky.end()}, kNominalCn0, known, {});
+  const auto with_all = range_fix(sky, kNominalCn0, known, {});
   ASSERT_TRUE(without_first && with_all);
   EXPECT_FALSE(same(*with_all, *without_first, 1e-3));
   const std::vector<void (*)(SatelliteObservation&)> spoilers = {
@@ -178,13 +179,13 @@ TEST(RangeFix, LeavesOutWhatCannotBeUsed) {
   for (std::size_t i = 0; i < spoilers.size(); ++i) {
     Sky spoilt = sky;
     spoilers[i](spoilt.front());
-    const auto fix = range_fix(spoilt, kFreeCn0, known, {});
+    const auto fix = range_fix(spoilt, kNominalCn0, known, {});
     ASSERT_TRUE(fix) << i;
     EXPECT_TRUE(same(*fix, *without_first, 0.0)) << i;
     for (SatelliteObservation& s : spoilt) spoilers[i](s);
-    EXPECT_FALSE(range_fix(spoilt, kFreeCn0, known, {})) << i;
+    EXPECT_FALSE(range_fix(spoilt, kNominalCn0, known, {})) << i;
   }
-  EXPECT_FALSE(range_fix({}, kFreeCn0, known, {}));
+  EXPECT_FALSE(range_fix({}, kNominalCn0, known, {}));
 }
 
 TEST(RangeFix, KnownPlaceMayBeNonsense) {
@@ -194,7 +195,7 @@ TEST(RangeFix, KnownPlaceMayBeNonsense) {
     for (const double sigma : {0.0, 1e-9, 1e9, 1e200, kNaN, kInfinity}) {
       RelativePlace known = known_place({offset, -offset}, sigma);
       known.covariance(0, 1) = known.covariance(1, 0) = 0.0;
-      const auto fix = range_fix(sky, kFreeCn0, known, {});
+      const auto fix = range_fix(sky, kNominalCn0, known, {});
       EXPECT_TRUE(!fix || is_sound(*fix)) << offset << ", " << sigma;
     }
   }
@@ -234,7 +235,7 @@ TEST(RangeFix, AnySkyGivesAFixThatIsSoundOrNothing) {
     p.range_sigma = std::pow(10.0, uniform_between(-8, 3, engine));
     const RelativePlace known =
         known_place({uniform_between(-1e3, 1e3, engine), 1.0}, std::pow(10.0, uniform_between(-6, 6, engine)));
-    const auto fix = range_fix(sky, kFreeCn0, known, p);
+    const auto fix = range_fix(sky, kNominalCn0, known, p);
     if (!fix) continue;
     ++solved;
     ASSERT_TRUE(is_sound(*fix)) << round;
@@ -263,86 +264,11 @@ TEST(RangeFix, ParametersAreChecked) {
   EXPECT_EQ(faults_of("{range_sigma: 8.5}"), 1u);
   EXPECT_EQ(faults_of("{range_sigma_min: 6.0, range_sigma_max: 5.5}"), 1u);
   EXPECT_GT(faults_of("{range_sigma: .nan}"), 0u);
-  EXPECT_EQ(faults_of("{range_bias_odds: 0.0, range_height_sigma: -1.0, weak_cn0_width: 0.0}"), 3u);
+  EXPECT_EQ(faults_of("{range_bias_odds: 0.0, range_height_sigma: -1.0, nlos_cn0_width: 0.0}"), 3u);
   RangeFixParameters p;
   p.range_sigma_min = 2.0;
   p.range_sigma_max = 8.0;
   EXPECT_DOUBLE_EQ(p.middle_range_sigma_m(), 4.0);
-}
-
-TEST(FreeSignalLevel, IsTheUpperDecile) {
-  const auto level_of = [](int weak, int strong) {
-    FreeSignalLevel level;
-    SatelliteObservation s = satellite(1, 0.0, radians_to_degrees(std::asin(0.6)));
-    for (int i = 0; i < weak + strong; ++i) {
-      s.cn0_dbhz = i < strong ? 45.0 : 30.0;
-      level.add({s}, {});
-    }
-    return level.cn0_dbhz();
-  };
-  EXPECT_FALSE(level_of(0, 0));
-  EXPECT_EQ(level_of(0, 1), 45.0);
-  EXPECT_EQ(level_of(95, 5), 30.0);
-  EXPECT_EQ(level_of(85, 15), 45.0);
-
-  FreeSignalLevel level;
-  RandomEngine engine = make_engine(110);
-  std::vector<double> values;
-  for (int i = 0; i < 2000; ++i) {
-    Sky sky = open_sky();
-    for (SatelliteObservation& s : sky) {
-      set_cn0(s, kFreeCn0 - values.emplace_back(35.0 + 4.0 * draw_normal(engine)));
-    }
-    level.add(sky, {});
-  }
-  std::sort(values.begin(), values.end());
-  EXPECT_NEAR(*level.cn0_dbhz(), values[values.size() * 9 / 10], 0.6);
-}
-
-TEST(FreeSignalLevel, KnowsTheAntenna) {
-  const auto level_at = [](double elevation_deg, double rise) {
-    RangeFixParameters p;
-    p.antenna_cn0_rise = rise;
-    FreeSignalLevel level;
-    SatelliteObservation s = satellite(1, 10.0, elevation_deg);
-    s.cn0_dbhz = 40.0;
-    level.add({s}, p);
-    return level.cn0_dbhz();
-  };
-  EXPECT_EQ(level_at(90.0, 10.0), 36.0);
-  EXPECT_EQ(level_at(0.0, 10.0), 46.0);
-  EXPECT_EQ(level_at(0.0, 0.0), 40.0);
-  EXPECT_EQ(level_at(90.0, -10.0), 44.0);
-}
-
-TEST(FreeSignalLevel, LeavesOutWhatIsNoSignal) {
-  FreeSignalLevel level;
-  SatelliteObservation s = satellite(1, 10.0, 90.0);
-  level.add({}, {});
-  level.add({s}, {});  // without C/N0
-  for (const double cn0 : {kNaN, 0.0, -3.0, kInfinity}) {
-    s.cn0_dbhz = cn0;
-    level.add({s}, {});
-  }
-  s.cn0_dbhz = 40.0;
-  for (const LookAngles& look : {LookAngles{0.0, -0.1}, LookAngles{0.0, kNaN}, LookAngles{kNaN, 0.5}}) {
-    s.look = look;
-    level.add({s}, {});
-  }
-  s.look = {0.0, 0.5 * kPi};
-  s.tracked = false;
-  level.add({s}, {});
-  EXPECT_FALSE(level.cn0_dbhz());
-  s.tracked = true;
-  level.add({s}, {});
-  EXPECT_EQ(level.cn0_dbhz(), 36.0);
-  for (const double cn0 : {1e300, 1e-300}) {
-    s.cn0_dbhz = cn0;
-    level.add({s}, {});
-  }
-  EXPECT_TRUE(std::isfinite(*level.cn0_dbhz()));
-  level.reset();
-  EXPECT_FALSE(level.cn0_dbhz());
 }
 
 }  // namespace

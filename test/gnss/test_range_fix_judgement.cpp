@@ -23,7 +23,7 @@ TEST(RangeFixJudgement, AWeakReflectionIsFound) {
   sky[low].residual_m += 40.0;
   set_cn0(sky[low], 15.0);
   EXPECT_GT((least_squares(sky) - place.head<2>()).norm(), 4.0);
-  const auto fix = range_fix(sky, kFreeCn0, known_place({0.0, 0.0}, 15.0), {});
+  const auto fix = range_fix(sky, kNominalCn0, known_place({0.0, 0.0}, 15.0), {});
   ASSERT_TRUE(fix);
   EXPECT_LT((fix->offset - place.head<2>()).norm(), 1.0);
 }
@@ -33,7 +33,7 @@ TEST(RangeFixJudgement, AStrongReflectionIsFoundWhereThePlaceIsKnown) {
   for (std::size_t i = 0; i < open_sky().size(); ++i) {
     Sky sky = with_ranges(open_sky(), place, {{Constellation::kGps, 100.0}});
     sky[i].residual_m += 40.0;
-    const auto fix = range_fix(sky, kFreeCn0, known_place(place.head<2>(), 2.0), {});
+    const auto fix = range_fix(sky, kNominalCn0, known_place(place.head<2>(), 2.0), {});
     ASSERT_TRUE(fix) << i;
     // One of 40 m is far beyond what is expected overhead, and counts there for a little too much.
     EXPECT_LT((fix->offset - place.head<2>()).norm(), sky[i].look.elevation_rad < 0.6 ? 1.3 : 2.0) << i;
@@ -48,7 +48,7 @@ TEST(RangeFixJudgement, WhatIsKnownDecides) {
   Sky sky = with_ranges(two_constellations(), {0.0, 0.0, 0.0});
   std::size_t reflected = 0;
   for (SatelliteObservation& s : sky) {
-    set_cn0(s, RangeFixParameters{}.weak_cn0_drop);  // says nothing
+    set_cn0(s, RangeFixParameters{}.nlos_cn0_drop);  // says nothing
     if (std::sin(s.look.azimuth_rad) > 0.0) continue;
     s.residual_m += 30.0;
     ++reflected;
@@ -56,20 +56,20 @@ TEST(RangeFixJudgement, WhatIsKnownDecides) {
   ASSERT_GT(2 * reflected, sky.size());
   const double off = least_squares(sky).norm();
   EXPECT_GT(off, 8.0);
-  const auto fix = range_fix(sky, kFreeCn0, known_place({0.0, 0.0}, 2.0), {});
+  const auto fix = range_fix(sky, kNominalCn0, known_place({0.0, 0.0}, 2.0), {});
   ASSERT_TRUE(fix);
   EXPECT_LT(fix->offset.norm(), 0.6 * off);
-  EXPECT_GT(range_fix(sky, kFreeCn0, known_place({0.0, 0.0}, 100.0), {})->offset.norm(), 0.8 * off);
+  EXPECT_GT(range_fix(sky, kNominalCn0, known_place({0.0, 0.0}, 100.0), {})->offset.norm(), 0.8 * off);
 }
 
 TEST(RangeFixJudgement, ReflectionsMakeTheFixWorthLess) {
   const RelativePlace known = known_place({0.0, 0.0}, 10.0);
   Sky sky = with_ranges(two_constellations(), {1.0, 2.0, 0.0});
-  double before = range_fix(sky, kFreeCn0, known, {})->covariance.trace();
+  double before = range_fix(sky, kNominalCn0, known, {})->covariance.trace();
   for (std::size_t i = 0; i < sky.size(); i += 3) {
     sky[i].residual_m += 35.0;
     set_cn0(sky[i], 20.0);
-    const double after = range_fix(sky, kFreeCn0, known, {})->covariance.trace();
+    const double after = range_fix(sky, kNominalCn0, known, {})->covariance.trace();
     EXPECT_GT(after, 1.02 * before) << i;
     before = after;
   }
@@ -83,7 +83,7 @@ struct Case {
 };
 
 double elevation_factor(const SatelliteObservation& s, const RangeFixParameters& p) {
-  return std::pow(0.6 / std::max(std::sin(s.look.elevation_rad), 0.1), p.reflected_elevation_exponent);
+  return std::pow(0.6 / std::max(std::sin(s.look.elevation_rad), 0.1), p.nlos.elevation_exponent);
 }
 
 Case draw_case(RandomEngine& engine, const RangeFixParameters& p) {
@@ -99,7 +99,7 @@ Case draw_case(RandomEngine& engine, const RangeFixParameters& p) {
     set_cn0(s, is_reflected ? 16.0 + 5.0 * draw_normal(engine) : 4.0 + 4.0 * draw_normal(engine));
     s.residual_m = range_gradient(s.look).dot(place) + clock_m + p.range_sigma * draw_normal(engine);
     if (is_reflected) {
-      s.residual_m += elevation_factor(s, p) * (p.reflected_range + p.reflected_range_sigma * draw_normal(engine));
+      s.residual_m += elevation_factor(s, p) * (p.nlos.mean + p.nlos.sigma * draw_normal(engine));
     }
     c.sky.push_back(s);
   }
@@ -126,13 +126,13 @@ struct BruteForce {
       double log_weight = 0.0;
       for (std::size_t i = 0; i < count; ++i) {
         const SatelliteObservation& s = c.sky[i];
-        const double weaker_db = kFreeCn0 + p.antenna_cn0_rise * (std::sin(s.look.elevation_rad) - 0.6) - s.cn0_dbhz;
+        const double weaker_db = kNominalCn0 + p.nlos.cn0_rise * (std::sin(s.look.elevation_rad) - 0.6) - s.cn0_dbhz;
         const double prior =
-            std::clamp(1.0 / (1.0 + std::exp((p.weak_cn0_drop - weaker_db) / p.weak_cn0_width)), 0.02, 0.98);
+            std::clamp(1.0 / (1.0 + std::exp((p.nlos_cn0_drop - weaker_db) / p.nlos.cn0_width)), 0.02, 0.98);
         const bool is_reflected = (assignment >> i & 1) != 0;
         if (is_reflected) {
           const double larger = elevation_factor(s, p);
-          noise[i] = {larger * p.reflected_range, larger * p.reflected_range_sigma};
+          noise[i] = {larger * p.nlos.mean, larger * p.nlos.sigma};
         }
         log_weight += std::log(is_reflected ? prior : 1.0 - prior) - std::log(noise[i].sigma_m);
       }
@@ -184,7 +184,7 @@ TEST(RangeFixJudgement, AgreesWithAllAssignmentsTried) {
     const Case c = draw_case(engine, p);
     const BruteForce reference(c, p);
     if (std::sqrt(reference.best.covariance.trace()) > 12.0) continue;
-    const auto fix = range_fix(c.sky, kFreeCn0, c.known, p);
+    const auto fix = range_fix(c.sky, kNominalCn0, c.known, p);
     ASSERT_TRUE(fix);
     all.add(*fix, reference.best);
     if (reference.probability > 0.8) sure.add(*fix, reference.best);

@@ -51,7 +51,7 @@ void expect_second_moment_of_simulated_fixes(const GnssCovarianceParameters& p, 
   std::vector<double> scale;
   for (const auto& s : sky) {
     scale.push_back(std::pow(hidden_share, p.nlos_hidden_exponent) *
-                    std::pow(0.75 / std::tan(s.look.elevation_rad), p.nlos_elevation_exponent));
+                    std::pow(0.75 / std::tan(s.look.elevation_rad), p.nlos.elevation_exponent));
   }
   Eigen::MatrixXd h(count, 4);
   Eigen::VectorXd weight(count);
@@ -69,8 +69,8 @@ void expect_second_moment_of_simulated_fixes(const GnssCovarianceParameters& p, 
     for (Eigen::Index i = 0; i < count; ++i) {
       const auto k = static_cast<std::size_t>(i);
       const bool is_reflected = draw_uniform(engine) < result.satellites[k].nlos_probability;
-      const double sigma = is_reflected ? std::max(scale[k] * p.nlos_sigma, p.sigma_ure) : p.sigma_ure;
-      error[i] = (is_reflected ? scale[k] * p.nlos_mean : 0.0) + sigma * draw_normal(engine);
+      const double sigma = is_reflected ? std::max(scale[k] * p.nlos.sigma, p.sigma_ure) : p.sigma_ure;
+      error[i] = (is_reflected ? scale[k] * p.nlos.mean : 0.0) + sigma * draw_normal(engine);
     }
     const Eigen::Vector2d fix = (gain * error).head<2>();
     moment += fix * fix.transpose() / kDraws;
@@ -84,8 +84,8 @@ TEST(SoftGnssCovariance, SoftIsTheSecondMomentOfSimulatedFixes) {
   GnssCovarianceParameters p;
   expect_second_moment_of_simulated_fixes(p, 0);
   p.nlos_hidden_exponent = 0.7;
-  p.nlos_elevation_exponent = 1.2;
-  p.nlos_mean = 40.0;
+  p.nlos.elevation_exponent = 1.2;
+  p.nlos.mean = 40.0;
   expect_second_moment_of_simulated_fixes(p, 0);
   expect_second_moment_of_simulated_fixes(p, 7);
 }
@@ -117,7 +117,7 @@ TEST(SoftGnssCovariance, ReflectionsGrowTowardsTheHorizonIfToldSo) {
     const auto sigma_with = [&](double exponent) {
       GnssCovarianceParameters p;
       p.sigma_ure = 0.01;  // nothing but the reflection counts
-      p.nlos_elevation_exponent = exponent;
+      p.nlos.elevation_exponent = exponent;
       p.receiver_weighting = ReceiverWeighting::kEqual;
       Sky sky = open_sky(60.0, 0.0);
       sky[0].look.elevation_rad = degrees_to_radians(elevation_deg);
@@ -139,14 +139,14 @@ TEST(SoftGnssCovariance, OpenSkyHasNoReflectionsToGrow) {
   GnssCovarianceParameters p;
   const auto base = compute(open_sky(60.0, 0.0), p);
   p.nlos_hidden_exponent = 2.0;
-  p.nlos_elevation_exponent = 2.0;
+  p.nlos.elevation_exponent = 2.0;
   EXPECT_TRUE(compute(open_sky(60.0, 0.0), p).weighted.isApprox(base.weighted, 1e-2));
 }
 
 TEST(SoftGnssCovariance, DelayOfAllRangesGoesIntoTheClock) {
   GnssCovarianceParameters p;
   p.nlos_if_blocked = 0.999;
-  p.nlos_sigma = p.sigma_ure;
+  p.nlos.sigma = p.sigma_ure;
   const auto result = compute(open_sky(kNaN, 1.0), p);
   EXPECT_TRUE(result.model.isApprox(equation_4(open_sky(), 3.75), 0.1)) << "not 25 m of error";
 }

@@ -14,7 +14,8 @@ namespace {
 
 /// A Kalman filter of pose and odometry errors themselves, not of an error that is fed back: Jacobians by differences.
 struct DirectEkf {
-  DeadReckoningParameters odometry;
+  OdometryErrorParameters odometry;
+  MotionParameters motion;
   ErrorState state{ErrorState::Zero()};
   ErrorCovariance covariance{ErrorCovariance::Zero()};
 
@@ -34,8 +35,8 @@ struct DirectEkf {
       difference(2) = wrap_angle(difference(2));
       jacobian.col(i) = difference / (2.0 * kDelta);
     }
-    const DeadReckoningStep step =
-        dead_reckon({state(0), state(1), state(2)}, {state(3), state(4)}, twist, duration_s, odometry);
+    const DeadReckoningStep step = dead_reckon({state(0), state(1), state(2)}, {state(3), state(4)},
+                                               make_motion_step(twist, duration_s, motion, odometry), odometry);
     state = moved(state, twist, duration_s);
     covariance = jacobian * covariance * jacobian.transpose() + step.noise;
   }
@@ -57,7 +58,7 @@ TEST(ComplementaryEkf, EqualsADirectFilterOfThePose) {
   ComplementaryEkfParameters parameters =
       with(ComplementaryEkfParameters(), "{mode: standard, adapt_fix_noise: false}");
   ComplementaryEkf filter(parameters);
-  DirectEkf direct{parameters.odometry};
+  DirectEkf direct{parameters.odometry, parameters.motion};
   const PoseEstimate start = pose_with_sigma({3.0, -2.0, 3.0}, 1.0, 0.1);
   filter.initialize(start);
   direct.state << 3.0, -2.0, 3.0, 0.0, 0.0;
@@ -315,7 +316,7 @@ TEST(ComplementaryEkf, SpikeTouchesNothing) {
   }
 }
 
-// A jump of 40 m that the bias filter takes must not turn the robot (F8).
+// A jump of 40 m that the bias filter takes must not turn the robot.
 TEST(ComplementaryEkf, JumpDoesNotTurnTheRobot) {
   Drive drive(7);
   drive.run(60.0);

@@ -19,7 +19,7 @@ double total(const ParticleSet& particles) {
   return std::accumulate(particles.weight.begin(), particles.weight.end(), 0.0);
 }
 
-TEST(ParticleSet, NormalisesWithoutUnderflowF30) {
+TEST(ParticleSet, NormalisesWithoutUnderflow) {
   for (const double offset : {0.0, -1e6, 1e6, -1e300}) {
     ParticleSet particles(3);
     particles.log_weight = {offset, offset, offset};

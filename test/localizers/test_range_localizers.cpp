@@ -68,7 +68,8 @@ std::unique_ptr<Localizer> make_imm(const std::string& changes) {
   return std::make_unique<ImmEkf>(with(ImmEkfParameters{}, changes), MotionParameters{});
 }
 std::unique_ptr<Localizer> make_switching(const std::string& changes) {
-  return make_particle_filter(with(with(ParticleFilterParameters{}, "mode: switching"), changes), {});
+  return std::make_unique<SwitchingParticleFilter>(with(SwitchingParticleFilterParameters{}, changes),
+                                                   MotionParameters{});
 }
 
 /// Two YAML maps as one.
@@ -128,12 +129,13 @@ TEST_P(RangeLocalizers, EveryRangeParameterHasAnEffectF36) {
       {"range_sigma: 3.0", "{}"},
       {"range_sigma_min: 4.0", "fix_scale_rate: 0.3"},
       {"range_sigma_max: 6.0", "fix_scale_rate: 0.3"},
-      {"reflected_range: 25.0", "{}"},
-      {"reflected_range_sigma: 20.0", "{}"},
-      {"reflected_elevation_exponent: 0.3", "{}"},
-      {"weak_cn0_drop: 8.0", "{}"},
-      {"weak_cn0_width: 2.0", "{}"},
-      {"antenna_cn0_rise: 3.0", "{}"},
+      {"nlos_mean: 25.0", "{}"},
+      {"nlos_sigma: 20.0", "{}"},
+      {"nlos_elevation_exponent: 0.3", "{}"},
+      {"nlos_cn0_drop: 8.0", "{}"},
+      {"nlos_cn0_width: 2.0", "{}"},
+      {"nlos_cn0_rise: 3.0", "{}"},
+      {"nlos_elevation_law: cotangent", "{}"},
       {"range_height_sigma: 5.0", "{}"},
       {"range_correlation_time: 1.0", "{}"},
       {"range_bias_odds: 1.0", "{}"},
@@ -172,13 +174,13 @@ TEST(RangeImmEkf, OddsOfABiasMatter) {
 /// The fix that a receiver's ranges make, and how it is weighed.
 struct ReceiverRig {
   SwitchingModelParameters parameters;
-  ReceiverModel model{parameters};
+  FixStatistics statistics{parameters};
   BiasGaussian before;
   double time_s{0.0};
 
   explicit ReceiverRig(const std::string& changes = "{}")
       : parameters(with(SwitchingModelParameters{}, changes)),
-        model(parameters),
+        statistics(parameters),
         before(start_gaussian(pose_with_sigma({}, 5.0, 0.1), parameters)) {}
 
   FixMeasurement fix(const Sky& sky = with_ranges(two_constellations(), {3.0, -2.0, 0.0})) {
@@ -189,29 +191,29 @@ struct ReceiverRig {
   /// Fixes that misfit to this share.
   void learn(int count, double exceeding) {
     for (int i = 0; i < count; ++i) {
-      model.believed(fix(), before);
-      model.learn_fix(time_s, exceeding);
+      statistics.effective_fix(fix(), before);
+      statistics.learn_fix(time_s, exceeding);
     }
   }
 };
 
-TEST(RangeReceiverModel, TakesTheRangesInPlaceOfTheFix) {
+TEST(RangeFixStatistics, TakesTheRangesInPlaceOfTheFix) {
   ReceiverRig rig;
   const FixMeasurement declared = rig.fix();
-  const FixMeasurement believed = rig.model.believed(declared, rig.before);
-  EXPECT_LT((believed.position - Eigen::Vector2d(3.0, -2.0)).norm(), 0.3);
-  EXPECT_FALSE(believed.covariance.isApprox(declared.covariance, 0.1));
-  EXPECT_EQ(rig.model.fix_noise(1.0).scale, 1.0);
-  EXPECT_EQ(rig.model.bias_odds(), rig.parameters.ranges.range_bias_odds);
+  const FixMeasurement effective = rig.statistics.effective_fix(declared, rig.before);
+  EXPECT_LT((effective.position - Eigen::Vector2d(3.0, -2.0)).norm(), 0.3);
+  EXPECT_FALSE(effective.covariance.isApprox(declared.covariance, 0.1));
+  EXPECT_EQ(rig.statistics.fix_noise(1.0).scale, 1.0);
+  EXPECT_EQ(rig.statistics.bias_odds(), rig.parameters.ranges.range_bias_odds);
   // A fix without: as declared, with what has been learnt of fixes.
-  const FixMeasurement plain = rig.model.believed(rig.fix({}), rig.before);
+  const FixMeasurement plain = rig.statistics.effective_fix(rig.fix({}), rig.before);
   EXPECT_EQ(plain.position, declared.position);
   EXPECT_TRUE(plain.covariance.isApprox(declared.covariance, 1e-9));
-  EXPECT_EQ(rig.model.fix_noise(1.0).scale, rig.parameters.noise.first_fix_scale);
-  EXPECT_EQ(rig.model.bias_odds(), 1.0);
+  EXPECT_EQ(rig.statistics.fix_noise(1.0).scale, rig.parameters.noise.first_fix_scale);
+  EXPECT_EQ(rig.statistics.bias_odds(), 1.0);
 }
 
-TEST(RangeReceiverModel, TheAntennaAndNotTheBaseIsWhereRangesSay) {
+TEST(RangeFixStatistics, TheAntennaAndNotTheBaseIsWhereRangesSay) {
   // What is known is the place of the antenna: 30 m from the base, and a reflection is judged by it.
   ReceiverRig rig;
   rig.before = start_gaussian(pose_with_sigma({}, 1.0, 0.01), rig.parameters);
@@ -219,57 +221,57 @@ TEST(RangeReceiverModel, TheAntennaAndNotTheBaseIsWhereRangesSay) {
   sky[5].residual_m += 40.0;
   FixMeasurement fix = rig.fix(sky);
   fix.antenna_in_body = {30.0, 0.0};
-  EXPECT_LT((rig.model.believed(fix, rig.before).position - Eigen::Vector2d(30.0, 0.0)).norm(), 1.0);
+  EXPECT_LT((rig.statistics.effective_fix(fix, rig.before).position - Eigen::Vector2d(30.0, 0.0)).norm(), 1.0);
 }
 
-TEST(RangeReceiverModel, LearnsHowGoodRangesAreWithinLimits) {
+TEST(RangeFixStatistics, LearnsHowGoodRangesAreWithinLimits) {
   ReceiverRig rig;
   const RangeFixParameters& p = rig.parameters.ranges;
-  EXPECT_NEAR(rig.model.range_sigma_m(), p.range_sigma, 1e-9);
-  const double first = rig.model.believed(rig.fix(), rig.before).covariance.trace();
+  EXPECT_NEAR(rig.statistics.range_sigma_m(), p.range_sigma, 1e-9);
+  const double first = rig.statistics.effective_fix(rig.fix(), rig.before).covariance.trace();
   double last = p.range_sigma;
   for (int round = 0; round < 300; ++round) {
     rig.learn(1, 0.0);
-    EXPECT_LE(rig.model.range_sigma_m(), last);
-    EXPECT_GE(rig.model.range_sigma_m(), p.range_sigma_min - 1e-9);
-    last = rig.model.range_sigma_m();
+    EXPECT_LE(rig.statistics.range_sigma_m(), last);
+    EXPECT_GE(rig.statistics.range_sigma_m(), p.range_sigma_min - 1e-9);
+    last = rig.statistics.range_sigma_m();
   }
   EXPECT_NEAR(last, p.range_sigma_min, 1e-9);
-  EXPECT_LT(rig.model.believed(rig.fix(), rig.before).covariance.trace(), 0.2 * first);
+  EXPECT_LT(rig.statistics.effective_fix(rig.fix(), rig.before).covariance.trace(), 0.2 * first);
   for (int round = 0; round < 300; ++round) {
     rig.learn(1, 1.0);
-    EXPECT_LE(rig.model.range_sigma_m(), p.range_sigma_max + 1e-9);
+    EXPECT_LE(rig.statistics.range_sigma_m(), p.range_sigma_max + 1e-9);
   }
-  EXPECT_NEAR(rig.model.range_sigma_m(), p.range_sigma_max, 1e-9);
+  EXPECT_NEAR(rig.statistics.range_sigma_m(), p.range_sigma_max, 1e-9);
 
-  rig.model.reset();
-  EXPECT_NEAR(rig.model.range_sigma_m(), p.range_sigma, 1e-9);
+  rig.statistics.reset();
+  EXPECT_NEAR(rig.statistics.range_sigma_m(), p.range_sigma, 1e-9);
   // The level of free signals is forgotten, too: of weak ones alone, nobody knows that they are weak.
   const auto after_strong = [](bool resets) {
     ReceiverRig weak;
     Sky sky = with_ranges(open_sky(), {0.0, 0.0, 0.0});
     if (resets) {
-      for (int i = 0; i < 50; ++i) weak.model.believed(weak.fix(sky), weak.before);
-      weak.model.reset();
+      for (int i = 0; i < 50; ++i) weak.statistics.effective_fix(weak.fix(sky), weak.before);
+      weak.statistics.reset();
     }
     for (SatelliteObservation& s : sky) s.cn0_dbhz -= 20.0;
-    return weak.model.believed(weak.fix(sky), weak.before).covariance;
+    return weak.statistics.effective_fix(weak.fix(sky), weak.before).covariance;
   };
   EXPECT_EQ(after_strong(true), after_strong(false));
 }
 
-TEST(RangeReceiverModel, FixesAndRangesAreLearntApart) {
+TEST(RangeFixStatistics, FixesAndRangesAreLearntApart) {
   ReceiverRig rig;
   rig.learn(100, 1.0);
-  rig.model.believed(rig.fix({}), rig.before);
-  EXPECT_EQ(rig.model.fix_noise(rig.time_s).scale, rig.parameters.noise.first_fix_scale);
-  rig.model.learn_fix(rig.time_s, 1.0);
-  EXPECT_GT(rig.model.fix_noise(rig.time_s).scale, rig.parameters.noise.first_fix_scale);
-  EXPECT_NEAR(rig.model.range_sigma_m(), rig.parameters.ranges.range_sigma_max, 1e-9);
+  rig.statistics.effective_fix(rig.fix({}), rig.before);
+  EXPECT_EQ(rig.statistics.fix_noise(rig.time_s).scale, rig.parameters.noise.first_fix_scale);
+  rig.statistics.learn_fix(rig.time_s, 1.0);
+  EXPECT_GT(rig.statistics.fix_noise(rig.time_s).scale, rig.parameters.noise.first_fix_scale);
+  EXPECT_NEAR(rig.statistics.range_sigma_m(), rig.parameters.ranges.range_sigma_max, 1e-9);
   // Where nothing is learnt, the declared range_sigma is what counts.
   ReceiverRig fixed("{fix_scale_rate: 0.0, range_sigma: 3.0}");
   fixed.learn(100, 1.0);
-  EXPECT_EQ(fixed.model.range_sigma_m(), 3.0);
+  EXPECT_EQ(fixed.statistics.range_sigma_m(), 3.0);
 }
 
 }  // namespace

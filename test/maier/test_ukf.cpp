@@ -115,7 +115,7 @@ TEST(Ukf, TurnsWithTheMapAcrossTheWrapOfTheYaw) {
       ukf.correct(fix_at(transform_point(map, truth.position() + noise), 1.0, 0.1 * i));
     }
     EXPECT_TRUE(near(ukf.pose(), compose(map, truth), 1.0));
-    return between(map, ukf.pose());
+    return relative_pose(map, ukf.pose());
   };
   // Not to rounding: a Cholesky root, and with it what the sigma points leave of the higher orders, depends on the
   // axes.
@@ -278,20 +278,6 @@ TEST(Ukf, FindsAHeadingThatIsUnknown) {
     if (near(ukf.pose(), truth, 1.5)) ++found;
   }
   EXPECT_GE(found, 18);
-}
-
-TEST(NearestPositiveDefinite, LeavesSoundMatricesAndRepairsOthers) {
-  RandomEngine engine = make_engine(9);
-  for (int trial = 0; trial < 200; ++trial) {
-    Eigen::Matrix<double, 5, 5> a;
-    for (Eigen::Index i = 0; i < a.size(); ++i) a.data()[i] = draw_normal(engine);
-    const Eigen::Matrix<double, 5, 1> scale = Eigen::Array<double, 5, 1>(1e3, 1.0, 1e-2, 1e-4, 1e2);
-    const Eigen::Matrix<double, 5, 5> sound = scale.asDiagonal() * (a * a.transpose()) * scale.asDiagonal();
-    EXPECT_TRUE(nearest_positive_definite<5>(sound).isApprox(sound, 1e-6));
-    const Eigen::Matrix<double, 5, 5> indefinite = scale.asDiagonal() * (a + a.transpose()) * scale.asDiagonal();
-    EXPECT_TRUE(is_positive_definite<5>(nearest_positive_definite<5>(indefinite)));
-  }
-  EXPECT_TRUE(is_positive_definite<5>(nearest_positive_definite<5>(Eigen::Matrix<double, 5, 5>::Zero())));
 }
 
 }  // namespace

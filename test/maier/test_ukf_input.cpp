@@ -13,7 +13,7 @@ namespace {
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-TEST(UkfInput, BadInputChangesNothingF25) {
+TEST(UkfInput, BadInputChangesNothing) {
   Ukf ukf(UkfParameters(), {});
   ukf.initialize(pose_with_sigma({1.0, 2.0, 0.5}, 1.0, 0.1));
   ukf.move({1.0, 0.1}, 0.1);
@@ -53,7 +53,7 @@ TEST(UkfInput, BadInputChangesNothingF25) {
   EXPECT_EQ(ukf.state(), state);
 }
 
-TEST(UkfInput, ParkedRobotStaysF34) {
+TEST(UkfInput, ParkedRobotStays) {
   Ukf ukf(UkfParameters(), {});
   ukf.initialize(pose_with_sigma({1.0, 2.0, 0.5}, 0.5, 0.1));
   for (int i = 0; i < 36000; ++i) ukf.move({0.0, 0.002}, 0.1);  // an hour, with a gyroscope's bias
@@ -82,7 +82,7 @@ Ukf settled(OutlierPolicy policy) {
   return ukf;
 }
 
-TEST(UkfInput, OutlierDoesNotCorruptHeadingOrBiasF8) {
+TEST(UkfInput, OutlierDoesNotCorruptHeadingOrBias) {
   const auto shift = [](OutlierPolicy policy, FixDecision expected) {
     Ukf ukf = settled(policy);
     const Ukf::State before = ukf.state();
@@ -112,7 +112,7 @@ TEST(UkfInput, GoodFixIsAccepted) {
   }
 }
 
-TEST(UkfInput, GateRestartsOnTheFixAfterTheTimeoutF3) {
+TEST(UkfInput, GateRestartsOnTheFixAfterTheTimeout) {
   Ukf ukf = settled(OutlierPolicy::kGate);
   const double yaw = ukf.pose().yaw;
   for (int i = 0; i < 5; ++i) {
@@ -171,7 +171,7 @@ TEST(UkfInput, CorrelatedErrorsTellLess) {
   EXPECT_NEAR(variance_after(10.0, 0.0, 1.0), 0.5, 1e-5) << "the same fix twice";
 }
 
-TEST(UkfInput, EveryParameterHasAnEffectF36) {
+TEST(UkfInput, EveryParameterHasAnEffect) {
   const auto outcome = [](const UkfParameters& p) {
     Ukf ukf(p, {});
     ukf.initialize(pose_with_sigma({}, 1.0, 0.5));

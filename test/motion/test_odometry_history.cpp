@@ -101,7 +101,7 @@ TEST(OdometryHistory, KeepsItsWindowAndNotMuchMore) {
   EXPECT_TRUE(history.pose_at(from_seconds(1.0)));
 }
 
-TEST(OdometryHistory, NoFieldOfAMessageMayBeAbsurdF25) {
+TEST(OdometryHistory, NoFieldOfAMessageMayBeAbsurd) {
   const OdometrySample good{from_seconds(1.0), {1.0, 2.0, 3.0}, {5.0, 1.0}};
   EXPECT_EQ(odometry_fault(good), "");
   for (const double bad : {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(), -1e300}) {

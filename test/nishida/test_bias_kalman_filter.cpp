@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "matchers.hpp"
-#include "urban_gnss_localization/localizers/nishida/bias_kalman_filter.hpp"
 #include "urban_gnss_localization/gnss/chi_squared.hpp"
+#include "urban_gnss_localization/localizers/nishida/bias_kalman_filter.hpp"
 
 namespace urban_gnss {
 namespace {
@@ -179,7 +179,7 @@ TEST(BiasTracker, ShadowIsSetWhileTheBiasIsSignificant) {
   EXPECT_EQ(shadow_misses, 0);
 }
 
-TEST(BiasTracker, GateRejectsAJumpAndRecoversAfterItsTimeoutF3) {
+TEST(BiasTracker, GateRejectsAJumpAndRecoversAfterItsTimeout) {
   GpsBiasParameters parameters;
   parameters.gate_timeout = 5.0;
   BiasTracker tracker(parameters);
@@ -218,7 +218,7 @@ TEST(BiasTracker, OneGoodFixStartsTheTimeoutAnew) {
   }
 }
 
-TEST(BiasTracker, SanitationsDecisionIsPassedOn) {
+TEST(BiasTracker, ValidationsDecisionIsPassedOn) {
   BiasTracker tracker({});
   FixVerdict inflated;
   inflated.decision = FixDecision::kInflated;
@@ -244,7 +244,7 @@ TEST(BiasTracker, ResetForgetsEverything) {
   }
 }
 
-TEST(BiasTracker, EveryParameterHasAnEffectF36) {
+TEST(BiasTracker, EveryParameterHasAnEffect) {
   const auto trace = [](const GpsBiasParameters& parameters) {
     BiasTracker tracker(parameters);
     std::vector<double> values;

@@ -35,7 +35,7 @@ ParticleSet permuted(const ParticleSet& particles) {
   return result;
 }
 
-TEST(Estimation, MeanAngleIsTakenOnTheCircleF31) {
+TEST(Estimation, MeanAngleIsTakenOnTheCircle) {
   ParticleSet particles(2);
   particles.yaw = {kPi - 0.1, -kPi + 0.3};
   EXPECT_NEAR(std::abs(angle_difference(circular_mean(particles).yaw, -kPi + 0.1)), 0.0, 1e-14);
@@ -123,7 +123,7 @@ TEST(Estimation, OrderOfTheParticlesDoesNotMatter) {
   EXPECT_TRUE(near(clusters.heaviest_mean(other), heaviest, 1e-11));
 }
 
-TEST(Clusters, HeavierOfTwoBlobsIsTheEstimateF32) {
+TEST(Clusters, HeavierOfTwoBlobsIsTheEstimate) {
   RandomEngine engine = make_engine(4);
   ParticleSet particles(1000);
   add_blob(particles, 0, 300, {20.0, 0.0, 0.5}, engine);

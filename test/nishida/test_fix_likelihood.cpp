@@ -137,7 +137,7 @@ TEST(FixLikelihood, ProductCommutesWithRotationAndTranslation) {
   }
 }
 
-TEST(FixLikelihood, AKilometreAwayIsUnlikelyButNotImpossibleF30) {
+TEST(FixLikelihood, AKilometreAwayIsUnlikelyButNotImpossible) {
   for (const LikelihoodForm form : kForms) {
     for (const bool with_shadow : {false, true}) {
       FixLikelihood fix = example(form);

@@ -42,7 +42,7 @@ TEST(FixQueue, RejectedFixesWaitNoLongerAndAreToldOnce) {
 }
 
 TEST(FixQueue, ParametersAreThoseOfTheValidation) {
-  FixSanitationParameters parameters;
+  FixValidationParameters parameters;
   parameters.fix_sigma_floor = 2.0;
   FixQueue queue(parameters);
   queue.add(at(1.0));

@@ -1,4 +1,5 @@
 #include "pipeline_rig.hpp"
+#include "urban_gnss_localization/localizers/nishida/particle_filter.hpp"
 #include "urban_gnss_localization/localizers/switching/imm_ekf.hpp"
 #include "urban_gnss_localization/localizers/switching/switching_particle_filter.hpp"
 
@@ -31,7 +32,7 @@ TEST(LocalizationPipeline, LateFixIsComparedWithThePoseAtItsOwnStamp) {
     const FixMeasurement& fix = rig.fake->fixes.back();
     EXPECT_NEAR(fix.time_s, 1000.0 + time, 1e-9);
     EXPECT_LT((transform_point(Rig::truth(4.0), fix.antenna_in_body) - fix.position).norm(), 1e-6) << time;
-    const Pose2 back = between(Rig::truth(4.0), Rig::truth(time));
+    const Pose2 back = relative_pose(Rig::truth(4.0), Rig::truth(time));
     EXPECT_LT((fix.antenna_in_body - transform_point(back, {0.4, -0.3})).norm(), 1e-12) << time;
   }
 }
@@ -221,16 +222,28 @@ TEST(LocalizationPipeline, StampsAscendAcrossAResetThatIsAskedFor) {
   EXPECT_EQ(rig.pipeline.take_outputs().size(), 1u);
 }
 
+using MakeFilter = std::unique_ptr<Localizer> (*)(int particle_count);
+
+template <ParticleFilterMode kMode>
+std::unique_ptr<Localizer> make_filter(int particle_count) {
+  ParticleFilterParameters filter;
+  filter.mode = kMode;
+  filter.likelihood = LikelihoodChoice::kProduct;
+  filter.particle_count = particle_count;
+  return std::make_unique<ParticleFilter>(filter, MotionParameters{});
+}
+constexpr MakeFilter make_paper_filter = make_filter<ParticleFilterMode::kPaper>;
+constexpr MakeFilter make_conventional_filter = make_filter<ParticleFilterMode::kConventional>;
+constexpr MakeFilter make_switching_filter = [](int) -> std::unique_ptr<Localizer> {
+  return std::make_unique<SwitchingParticleFilter>(SwitchingParticleFilterParameters{}, MotionParameters{});
+};
+
 TEST(LocalizationPipeline, ClockSetBackGivesTheSameRunAgain) {
-  for (const auto& [with_datum, mode] : {std::pair{false, ParticleFilterMode::kPaper},
-                                         {true, ParticleFilterMode::kPaper},
-                                         {true, ParticleFilterMode::kSwitching}}) {
+  for (const auto& [with_datum, make] :
+       {std::pair{false, make_paper_filter}, {true, make_paper_filter}, {true, make_switching_filter}}) {
     LocalizationParameters parameters;
     if (with_datum) parameters.datum.datum = {33.0, 130.0, 20.0};
-    ParticleFilterParameters filter;
-    filter.mode = mode;
-    filter.particle_count = 100;
-    Rig rig(parameters, make_particle_filter(filter, MotionParameters{}));
+    Rig rig(parameters, make(100));
     std::vector<LocalizationOutput> passes[2];
     for (auto& pass : passes) {
       rig.run(0.0, 60.0);
@@ -250,13 +263,8 @@ TEST(LocalizationPipeline, ClockSetBackGivesTheSameRunAgain) {
 TEST(LocalizationPipeline, TracksWithTheParticleFilter) {
   LocalizationParameters parameters;
   parameters.datum.datum = {33.0, 130.0, 20.0};
-  for (const auto mode :
-       {ParticleFilterMode::kConventional, ParticleFilterMode::kPaper, ParticleFilterMode::kSwitching}) {
-    ParticleFilterParameters filter;
-    filter.mode = mode;
-    filter.likelihood = LikelihoodChoice::kProduct;
-    filter.particle_count = 500;
-    Rig rig(parameters, make_particle_filter(filter, MotionParameters{}));
+  for (const auto make : {make_conventional_filter, make_paper_filter, make_switching_filter}) {
+    Rig rig(parameters, make(500));
     rig.run(0.0, 120.0);
     const auto outputs = rig.pipeline.take_outputs();
     ASSERT_FALSE(outputs.empty());
@@ -369,13 +377,13 @@ TEST(LocalizationPipeline, EveryParameterHasAnEffect) {
 
 TEST(LocalizationPipeline, ParametersAreChecked) {
   std::vector<std::string> faults;
-  LocalizationParameters{}.check(faults);
+  faults = faults_of(LocalizationParameters{});
   EXPECT_TRUE(faults.empty());
   LocalizationParameters parameters;
   parameters.start.initial_pose = {1.0, 2.0};
   parameters.input.antenna_offset = {1.0};
   parameters.datum.datum = {1.0};
-  parameters.check(faults);
+  faults = faults_of(parameters);
   EXPECT_EQ(faults.size(), 3u);
 }
 

@@ -378,10 +378,10 @@ TEST(OcclusionPipeline, ClearMapAndReset) {
 TEST(OcclusionPipeline, ParametersNameTheirFaults) {
   OcclusionPipelineParameters p;
   std::vector<std::string> faults;
-  p.check(faults);
+  faults = faults_of(p);
   EXPECT_TRUE(faults.empty());
   p.occlusion.antenna_offset = {1.0, 2.0};
-  p.check(faults);
+  faults = faults_of(p);
   ASSERT_EQ(faults.size(), 1u);
   EXPECT_EQ(faults[0].rfind("antenna_offset", 0), 0u);
 }

@@ -1,6 +1,7 @@
 #include "pipeline_rig.hpp"
 #include "range_rig.hpp"
 #include "urban_gnss_localization/localizers/switching/imm_ekf.hpp"
+#include "urban_gnss_localization/parameters/parameter_reader.hpp"
 
 namespace urban_gnss {
 namespace {

@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "matchers.hpp"
+#include "urban_gnss_localization/parameters/parameter_reader.hpp"
 #include "urban_gnss_localization/simulation/constellation.hpp"
 
 namespace urban_gnss {

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "matchers.hpp"
+#include "urban_gnss_localization/parameters/parameter_reader.hpp"
 #include "urban_gnss_localization/simulation/fix_faults.hpp"
 
 namespace urban_gnss {
@@ -176,7 +177,7 @@ TEST(FixFaults, ListsOfAnotherLengthAreFaults) {
   bad.offset = {1.0, 2.0};
   bad.rate = {};
   std::vector<std::string> faults;
-  bad.check(faults);
+  faults = faults_of(bad);
   ASSERT_EQ(faults.size(), 2u);
   EXPECT_NE(faults[0].find("offset"), std::string::npos);
   EXPECT_NE(faults[1].find("rate"), std::string::npos);

@@ -290,7 +290,7 @@ TEST(Lidar, DefaultsAre30000RaysAndWithoutFaults) {
   const WallIndex index(world);
   EXPECT_EQ(Lidar({}, world, index, 1).ray_count(), 30000u);
   std::vector<std::string> faults;
-  LidarParameters{}.check(faults);
+  faults = faults_of(LidarParameters{});
   EXPECT_TRUE(faults.empty());
 }
 
@@ -299,7 +299,7 @@ TEST(Lidar, FaultsNameTheField) {
     LidarParameters parameters;
     change(parameters);
     std::vector<std::string> faults;
-    parameters.check(faults);
+    faults = faults_of(parameters);
     return faults.size() == 1 ? faults[0].substr(0, faults[0].find(' ')) : "";
   };
   EXPECT_EQ(fault([](LidarParameters& p) { p.range_min = 80.0; }), "range_min");

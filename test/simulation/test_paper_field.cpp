@@ -6,6 +6,7 @@
 #include "matchers.hpp"
 #include "package_directory.hpp"
 #include "urban_gnss_localization/control/waypoint_controller.hpp"
+#include "urban_gnss_localization/parameters/parameter_reader.hpp"
 #include "urban_gnss_localization/simulation/paper_field.hpp"
 
 namespace urban_gnss {

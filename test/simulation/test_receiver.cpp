@@ -5,6 +5,7 @@
 
 #include "receiver_rig.hpp"
 #include "urban_gnss_localization/experiments/city_drive.hpp"
+#include "urban_gnss_localization/gnss/nominal_cn0.hpp"
 #include "urban_gnss_localization/gnss/range_fix.hpp"
 #include "urban_gnss_localization/simulation/receiver.hpp"
 
@@ -156,12 +157,12 @@ TEST(Receiver, ResidualsLeadFromTheFixToTheTruth) {
         EXPECT_GT(error.norm(), 30.0);
       }
       const auto observations = to_observations(epoch.satellites);
-      FreeSignalLevel level;
-      level.add(observations, {});
+      NominalCn0 nominal;
+      nominal.add(observations, {});
       RangeFixParameters p;
-      p.reflected_range = 1000.0;  // nothing is reflected
+      p.nlos.mean = 1000.0;  // nothing is NLOS
       const auto fix =
-          range_fix(observations, *level.cn0_dbhz(), {Eigen::Vector2d::Zero(), 1e4 * Eigen::Matrix2d::Identity()}, p);
+          range_fix(observations, *nominal.dbhz(), {Eigen::Vector2d::Zero(), 1e4 * Eigen::Matrix2d::Identity()}, p);
       ASSERT_TRUE(fix);
       EXPECT_LT((fix->offset - error).norm(), 0.2) << smoothing_time << ", " << i;
     }
@@ -204,12 +205,12 @@ TEST(Receiver, ResidualsOfAConstellationAverageToNothing) {
 TEST(Receiver, ParametersMustBeInOrder) {
   ReceiverParameters parameters;
   std::vector<std::string> faults;
-  parameters.check(faults);
+  faults = faults_of(parameters);
   EXPECT_TRUE(faults.empty());
   parameters.latency_min = 0.3;
   parameters.channel.tracking_threshold = 40.0;
   parameters.channel.cn0_horizon = 60.0;
-  parameters.check(faults);
+  faults = faults_of(parameters);
   EXPECT_EQ(faults.size(), 3u);
 }
 

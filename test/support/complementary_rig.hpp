@@ -5,8 +5,8 @@
 #include <string>
 
 #include "matchers.hpp"
-#include "urban_gnss_localization/localizers/kim/complementary_ekf.hpp"
 #include "urban_gnss_localization/gnss/chi_squared.hpp"
+#include "urban_gnss_localization/localizers/kim/complementary_ekf.hpp"
 
 namespace urban_gnss {
 
@@ -39,8 +39,8 @@ struct Drive {
     truth.x = draw_normal(engine);
     truth.y = draw_normal(engine);
     truth.yaw = 0.1 * draw_normal(engine);
-    errors.speed_scale = parameters.odometry.odom_scale_sigma * draw_normal(engine);
-    errors.yaw_rate_bias_radps = parameters.odometry.odom_yaw_bias_sigma * draw_normal(engine);
+    errors.speed_scale = parameters.odometry.speed_scale_sigma * draw_normal(engine);
+    errors.yaw_rate_bias_radps = parameters.odometry.yaw_rate_bias_sigma * draw_normal(engine);
   }
 
   FixMeasurement make_fix(double since = 0.0) {
@@ -57,22 +57,21 @@ struct Drive {
 
   void step() {
     const double dt = 1.0 / rate_hz;
-    const DeadReckoningParameters& p = parameters.odometry;
+    const OdometryErrorParameters& p = parameters.odometry;
     time_s += dt;
     const Twist2 measured{speed_mps, speed_mps > 0.0 ? 0.2 * std::sin(0.1 * time_s) : 0.0};
     filter.move(measured, dt);
     if (is_standstill(measured)) return;
-    Twist2 actual{(1.0 + errors.speed_scale) * measured.speed_mps,
-                  measured.yaw_rate_radps + errors.yaw_rate_bias_radps};
-    actual.speed_mps += p.odom_speed_noise * measured.speed_mps / std::sqrt(dt) * draw_normal(engine);
-    actual.yaw_rate_radps += p.odom_yaw_rate_noise * measured.yaw_rate_radps / std::sqrt(dt) * draw_normal(engine);
-    truth = move(truth, actual, dt);
-    truth.x += p.odom_position_noise * std::sqrt(dt) * draw_normal(engine);
-    truth.y += p.odom_position_noise * std::sqrt(dt) * draw_normal(engine);
-    truth.yaw = wrap_angle(truth.yaw + p.odom_heading_noise * std::sqrt(dt) * draw_normal(engine));
-    if (p.estimate_odometry_errors) {
-      errors.speed_scale += p.odom_scale_walk * std::sqrt(dt) * draw_normal(engine);
-      errors.yaw_rate_bias_radps += p.odom_yaw_bias_walk * std::sqrt(dt) * draw_normal(engine);
+    MotionNoise noise;
+    noise.speed = draw_normal(engine);
+    noise.input = draw_normal(engine);
+    truth = move_noisily(truth, make_motion_step(measured, dt, parameters.motion, p), noise, errors);
+    truth.x += p.position_walk * std::sqrt(dt) * draw_normal(engine);
+    truth.y += p.position_walk * std::sqrt(dt) * draw_normal(engine);
+    truth.yaw = wrap_angle(truth.yaw + p.heading_walk * std::sqrt(dt) * draw_normal(engine));
+    if (parameters.estimate_odometry_errors) {
+      errors.speed_scale += p.speed_scale_walk * std::sqrt(dt) * draw_normal(engine);
+      errors.yaw_rate_bias_radps += p.yaw_rate_bias_walk * std::sqrt(dt) * draw_normal(engine);
     }
   }
 

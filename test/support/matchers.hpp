@@ -12,6 +12,8 @@
 #include "urban_gnss_localization/common/random.hpp"
 #include "urban_gnss_localization/localizers/particle_set.hpp"
 #include "urban_gnss_localization/geometry/pose2.hpp"
+#include "urban_gnss_localization/parameters/parameter_list.hpp"
+#include "urban_gnss_localization/parameters/parameter_reader.hpp"
 
 namespace urban_gnss {
 
@@ -100,10 +102,8 @@ P with(P parameters, const std::string& yaml) {
 /// The names of all parameters of a struct.
 template <class P>
 std::vector<std::string> parameter_names(const P& parameters) {
-  ParameterWriter writer;
-  writer.write(parameters);
   std::vector<std::string> names;
-  for (const auto& entry : writer.map()) names.push_back(entry.first.as<std::string>());
+  for (const auto& listed : ParameterList().add(parameters).parameters()) names.push_back(listed.name);
   return names;
 }
 

@@ -10,11 +10,11 @@
 
 namespace urban_gnss {
 
-inline constexpr double kFreeCn0 = 45.0;  // dB-Hz, of a free signal at 37 degrees
+inline constexpr double kNominalCn0 = 45.0;  // dB-Hz, of a signal in line of sight at 37 degrees
 
-/// A signal as strong as free ones are, or weaker.
+/// A signal as strong as those in line of sight are, or weaker.
 inline void set_cn0(SatelliteObservation& s, double weaker_db = 0.0, const RangeFixParameters& p = {}) {
-  s.cn0_dbhz = kFreeCn0 + p.antenna_cn0_rise * (std::sin(s.look.elevation_rad) - 0.6) - weaker_db;
+  s.cn0_dbhz = kNominalCn0 + p.nlos.cn0_rise * (std::sin(s.look.elevation_rad) - 0.6) - weaker_db;
 }
 
 /// The partial derivatives of a residual by the antenna's place (east, north, up): by the look angles, as in textbooks.
@@ -44,9 +44,9 @@ inline Sky two_constellations() {
 /// Every range is taken for direct, whatever its residual.
 inline RangeFixParameters all_direct() {
   RangeFixParameters p;
-  p.reflected_range = 1000.0;
-  p.reflected_range_sigma = 20.0;
-  p.reflected_elevation_exponent = 0.0;
+  p.nlos.mean = 1000.0;
+  p.nlos.sigma = 20.0;
+  p.nlos.elevation_exponent = 0.0;
   return p;
 }
 

@@ -5,6 +5,7 @@
 
 #include "matchers.hpp"
 #include "urban_gnss_localization/localizers/switching/bias_modes.hpp"
+#include "urban_gnss_localization/parameters/parameter_reader.hpp"
 
 namespace urban_gnss {
 namespace {

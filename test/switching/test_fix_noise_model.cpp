@@ -54,15 +54,15 @@ TEST(FixNoiseModel, BelievesDeclaredUpsAndDownsByItsWeight) {
   usual << 4.0, 1.0, 1.0, 9.0;
   for (const double weight : {0.0, 0.5, 1.0}) {
     FixNoiseModel model(make("fix_covariance_weight: " + std::to_string(weight)));
-    for (int k = 0; k < 50; ++k) EXPECT_NEAR((model.believed(usual) - usual).norm(), 0.0, 1e-9);
+    for (int k = 0; k < 50; ++k) EXPECT_NEAR((model.effective_covariance(usual) - usual).norm(), 0.0, 1e-9);
     // A fix that declares three times that moves the mean a little itself; the ellipse keeps its shape.
-    const Eigen::Matrix2d raised = model.believed(3.0 * usual);
+    const Eigen::Matrix2d raised = model.effective_covariance(3.0 * usual);
     const double expected = std::pow(3.0, weight + (1.0 - weight) * 0.03);
     EXPECT_NEAR((raised - expected * usual).norm() / raised.norm(), 0.0, 1e-9) << weight;
     // One that is worth nothing stays worth next to nothing.
-    EXPECT_GT(model.believed(1e6 * usual).trace(), 0.24e6 * usual.trace()) << weight;
+    EXPECT_GT(model.effective_covariance(1e6 * usual).trace(), 0.24e6 * usual.trace()) << weight;
     model.reset();
-    EXPECT_NEAR((model.believed(3.0 * usual) - 3.0 * usual).norm(), 0.0, 1e-9);
+    EXPECT_NEAR((model.effective_covariance(3.0 * usual) - 3.0 * usual).norm(), 0.0, 1e-9);
   }
 }
 
@@ -127,7 +127,7 @@ TEST(FixNoiseModel, WhatTheOdometryIsUnsureOfIsNoErrorOfTheFixes) {
   EXPECT_LT(followed_scale(0.5, 2.0, 20.0, 0.05, 0.05), 0.4 * known);
 }
 
-TEST(FixNoiseModel, AResetForgetsTheFactorF26) {
+TEST(FixNoiseModel, AResetForgetsTheFactor) {
   FixNoiseModel model(make());
   for (int k = 0; k < 50; ++k) model.learn(k, 1.0);
   EXPECT_GT(model.scale(), 2.0);

@@ -125,7 +125,7 @@ TEST(ImmEkf, FindsABiasThatComesAtOnceAndItsEnd) {
   }
 }
 
-TEST(ImmEkf, FollowsASlowRampLessThanAPlainEkfF6) {
+TEST(ImmEkf, FollowsASlowRampLessThanAPlainEkf) {
   SwitchingDrive d;
   d.duration_s = 100.0;
   d.bias = ramp_between(40.0, 90.0, {0.0, 10.0});
@@ -193,7 +193,7 @@ TEST(ImmEkf, ASpikeSaysNothing) {
   EXPECT_LT(imm.health().position_spread_m, 2.0 * sigma_before);
 }
 
-TEST(ImmEkf, CovarianceIsHonestF14) {
+TEST(ImmEkf, CovarianceIsHonest) {
   double sum = 0.0;
   int count = 0;
   for (std::uint64_t seed = 101; seed < 121; ++seed) {
@@ -284,7 +284,7 @@ TEST(ImmEkf, LeverArmIsInTheAntennasPlace) {
   EXPECT_GT(aside.pose().yaw, 0.5 * kPi + 0.03);
 }
 
-TEST(ImmEkf, EveryParameterHasAnEffectF36) {
+TEST(ImmEkf, EveryParameterHasAnEffect) {
   const std::vector<std::pair<std::string, std::string>> changes = {
       {"use_fix_covariance: false", "{}"},
       {"direct_sigma: 1.0", "{}"},

@@ -90,7 +90,7 @@ TEST(ImmEkfVelocity, ChangesNothingOfAParkedRobot) {
   EXPECT_LT((imm.mixture().covariance - before.covariance).norm(), 1e-12);
 }
 
-TEST(ImmEkfVelocity, RefusesWhatCannotBeUsedF25) {
+TEST(ImmEkfVelocity, RefusesWhatCannotBeUsed) {
   ImmEkf imm = make();
   drive(imm, {});
   const ImmEkf::Gaussian before = imm.mixture();
@@ -150,7 +150,7 @@ TEST(ImmEkfVelocity, IsTheKalmanUpdateOfItsMeasurement) {
   EXPECT_LT((after.covariance - covariance).norm(), 1e-8);
 }
 
-TEST(ImmEkfVelocity, EveryParameterHasAnEffectF36) {
+TEST(ImmEkfVelocity, EveryParameterHasAnEffect) {
   const auto heading = [](const std::string& changes) {
     ImmEkf imm = make(changes);
     heading_after_loop(imm, 0.3, 0.2);

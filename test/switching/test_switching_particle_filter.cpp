@@ -13,11 +13,10 @@ namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
-ParticleFilterParameters switching(const std::string& changes = "{}") {
-  return with(
-      with(with(ParticleFilterParameters{}, "{mode: switching, yaw_rate_scale_sigma: 0.0, common_error_sigma: 0.0}"),
-           kTextbookNoise),
-      changes);
+SwitchingParticleFilterParameters switching(const std::string& changes = "{}") {
+  return with(with(with(SwitchingParticleFilterParameters{}, "{yaw_rate_scale_sigma: 0.0, common_error_sigma: 0.0}"),
+                   kTextbookNoise),
+              changes);
 }
 SwitchingParticleFilter make(const std::string& changes = "{}") { return {switching(changes), {}}; }
 
@@ -119,7 +118,7 @@ void see_two_places(SwitchingParticleFilter& filter) {
 }
 const char* const kOftenBiased = "{direct_time: 2.0, bias_end_time: 2.0, onset_sigma: 0.1}";
 
-TEST(SwitchingParticleFilter, EstimateIsOfTheHeaviestClusterF32) {
+TEST(SwitchingParticleFilter, EstimateIsOfTheHeaviestCluster) {
   SwitchingParticleFilter filter = make(kOftenBiased);
   see_two_places(filter);
   const LocalizerHealth health = filter.health();
@@ -133,7 +132,7 @@ TEST(SwitchingParticleFilter, EstimateIsOfTheHeaviestClusterF32) {
   EXPECT_GT(health.position_spread_m, 3.0);
 }
 
-TEST(SwitchingParticleFilter, SameSeedSameNumbersF26) {
+TEST(SwitchingParticleFilter, SameSeedSameNumbers) {
   SwitchingDrive d;
   d.bias = bias_between(20.0, 40.0, {10.0, 5.0});
   d.duration_s = 50.0;
@@ -176,7 +175,7 @@ TEST(SwitchingParticleFilter, AgreesWithTheInteractingModels) {
   }
 }
 
-TEST(SwitchingParticleFilter, CovarianceIsHonestF14) {
+TEST(SwitchingParticleFilter, CovarianceIsHonest) {
   double sum = 0.0;
   int count = 0;
   for (std::uint64_t seed = 101; seed < 111; ++seed) {
@@ -196,7 +195,7 @@ TEST(SwitchingParticleFilter, CovarianceIsHonestF14) {
   EXPECT_LT(sum / count, 1.6);
 }
 
-TEST(SwitchingParticleFilter, FindsAnUnknownHeadingF16) {
+TEST(SwitchingParticleFilter, FindsAnUnknownHeading) {
   SwitchingParticleFilter filter = make();
   PoseEstimate start = pose_with_sigma({}, 1.0, kPi);
   filter.initialize(start);
@@ -251,7 +250,7 @@ TEST(SwitchingParticleFilter, RefusesWhatIsNotFiniteAndSurvivesALongOutage) {
   }
 }
 
-TEST(SwitchingParticleFilter, FixThatNoParticleExplainsDoesNotAbortF30) {
+TEST(SwitchingParticleFilter, FixThatNoParticleExplainsDoesNotAbort) {
   SwitchingParticleFilter filter = make("outlier_share: 0.0");
   filter.initialize(pose_with_sigma({}, 0.1, 0.1));
   filter.correct(fix_of({1e200, 0.0}, 1.0, 1.0));
@@ -260,7 +259,7 @@ TEST(SwitchingParticleFilter, FixThatNoParticleExplainsDoesNotAbortF30) {
   EXPECT_TRUE(is_finite(filter.pose()));
 }
 
-TEST(SwitchingParticleFilter, EveryParameterHasAnEffectF36) {
+TEST(SwitchingParticleFilter, EveryParameterHasAnEffect) {
   const std::vector<std::pair<std::string, std::string>> changes = {
       {"max_particles: 3", "{}"},
       {"merge_distance: 5.0", "{}"},
@@ -301,14 +300,14 @@ TEST(SwitchingParticleFilter, EveryParameterHasAnEffectF36) {
       {"estimate: mean", kOftenBiased},
       {"cluster_cell: 20.0", kOftenBiased},
   };
-  // Those of the other modes, of a parked robot, of changing declarations, and of the covariance alone; elsewhere,
+  // Those of a parked robot, of changing declarations, and of the covariance alone; elsewhere,
   // those of ranges.
-  EXPECT_EQ(changes.size() + 14 + parameter_names(RangeFixParameters{}).size(),
-            parameter_names(ParticleFilterParameters{}).size());
+  EXPECT_EQ(changes.size() + 4 + parameter_names(RangeFixParameters{}).size(),
+            parameter_names(SwitchingParticleFilterParameters{}).size());
   SwitchingDrive d;
   d.bias = bias_between(10.0, 20.0, {4.0, 3.0});
   d.duration_s = 30.0;
-  const auto last = [&](const ParticleFilterParameters& p) {
+  const auto last = [&](const SwitchingParticleFilterParameters& p) {
     SwitchingParticleFilter filter(p, {});
     drive(filter, d);
     VelocityMeasurement velocity;
@@ -323,16 +322,8 @@ TEST(SwitchingParticleFilter, EveryParameterHasAnEffectF36) {
     return Pose2{x, filter.pose().x, filter.pose().y};
   };
   for (const auto& [change, base] : changes) {
-    const ParticleFilterParameters before = with(switching(), base);
+    const SwitchingParticleFilterParameters before = with(switching(), base);
     EXPECT_FALSE(last(with(before, change)) == last(before)) << change;
-  }
-}
-
-TEST(SwitchingParticleFilter, TheModeChoosesTheFilter) {
-  for (const char* mode : {"literal", "paper", "conventional", "switching"}) {
-    const auto filter = make_particle_filter(with(ParticleFilterParameters{}, std::string("mode: ") + mode), {});
-    EXPECT_EQ(filter->mode(), mode);
-    EXPECT_EQ(dynamic_cast<SwitchingParticleFilter*>(filter.get()) != nullptr, mode == std::string("switching"));
   }
 }
 

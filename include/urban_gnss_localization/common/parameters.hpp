@@ -1,10 +1,8 @@
 #pragma once
 
-#include <yaml-cpp/yaml.h>
-
 #include <cmath>
+#include <cstddef>
 #include <limits>
-#include <set>
 #include <stdexcept>
 #include <string>
 #include <type_traits>
@@ -22,12 +20,15 @@ struct Range {
   bool contains(double value) const {
     return std::isfinite(value) && (low_open ? value > low : value >= low) && value <= high;
   }
+  /// For an error: "must be " + "at least 0 and at most 1".
   std::string describe() const;
 };
 
+/// Both ends of a range are in it, but for positive(), which leaves out 0, and open_between(), which leaves out `low`.
 inline Range positive() { return {0.0, std::numeric_limits<double>::infinity(), true}; }
 inline Range non_negative() { return {0.0, std::numeric_limits<double>::infinity(), false}; }
 inline Range between(double low, double high) { return {low, high, false}; }
+inline Range open_between(double low, double high) { return {low, high, true}; }
 inline Range at_least(double low) { return {low, std::numeric_limits<double>::infinity(), false}; }
 inline Range any_number() { return {}; }
 
@@ -44,152 +45,108 @@ const char* enum_name(E value) {
   return "?";
 }
 
-/// Reads parameter structs out of one YAML map and collects every fault instead of stopping at the first.
-///
-/// A parameter struct lists its fields once, in `template <class V> void visit(V& v)`, as
-/// `v("name", field, range)` for numbers and `v("name", field)` for booleans, strings, enumerations and lists; and its
-/// conditions between fields in `void check(std::vector<std::string>& faults) const`. A name that is absent keeps its
-/// default; a name that nothing asked for is a fault, with the nearest known name.
-///
-/// A fault names the file and the line where it is known: `city.yaml:12: receiver.rate = 99: must be at most 20`.
-class ParameterReader {
- public:
-  /// `map` may be undefined or null (all defaults). `source` is the name of the file that it was read from, empty where
-  /// there is none or a fault needs no place. `path` stands before each name in the faults, as `receiver.` or
-  /// `buildings[2].` does.
-  explicit ParameterReader(const YAML::Node& map, std::string source = "", std::string path = "")
-      : map_(map.IsDefined() ? map : YAML::Node()), source_(std::move(source)), path_(std::move(path)) {}
-
-  template <class P>
-  ParameterReader& read(P& parameters) {
-    parameters.visit(*this);
-    std::vector<std::string> faults;
-    parameters.check(faults);
-    for (const std::string& text : faults)
-      faults_.push_back(at(text.substr(0, text.find_first_of(" :"))) + path_ + text);
-    return *this;
-  }
-
-  template <class T>
-  void operator()(const std::string& name, T& value, const Range& range) {
-    static_assert(std::is_arithmetic_v<T>, "a range belongs to a number");
-    const bool was_read = convert(name, value, std::is_integral_v<T> ? "a whole number" : "a number");
-    if (was_read && !range.contains(static_cast<double>(value))) {
-      bad_value(name, "must be " + range.describe());
-    }
-  }
-
-  template <class T>
-  void operator()(const std::string& name, T& value) {
-    if constexpr (std::is_enum_v<T>) {
-      read_enum(name, value);
-    } else if constexpr (std::is_same_v<T, bool>) {
-      convert(name, value, "true or false");
-    } else if constexpr (std::is_same_v<T, std::string>) {
-      convert(name, value, "a text");
-    } else {
-      if (convert(name, value, "a list of numbers")) {
-        for (const double element : value) {
-          if (!std::isfinite(element)) bad_value(name, "must be finite numbers");
-        }
-      }
-    }
-  }
-
-  /// Allows a name that someone else reads.
-  void ignore(const std::string& name) { known_.insert(name); }
-
-  /// Whether the map has a value under the name.
-  bool has(const std::string& name) const;
-  /// The value under the name, for the caller to read; null where there is none.
-  YAML::Node child(const std::string& name);
-
-  /// Adds a fault that the caller found in what stands under the name: `name: text`.
-  void fault(const std::string& name, const std::string& text) {
-    faults_.push_back(at(name) + path_ + name + ": " + text);
-  }
-  /// The same with the place of an element of it.
-  void fault(const YAML::Node& place, const std::string& name, const std::string& text) {
-    faults_.push_back(at(place) + path_ + name + ": " + text);
-  }
-  /// Takes over faults that already say where they are: those of a reader of a child, or of another file.
-  void add(const std::vector<std::string>& faults) { faults_.insert(faults_.end(), faults.begin(), faults.end()); }
-
-  const std::string& source() const { return source_; }
-
-  /// Every fault, in the order found, the unknown names last. Empty where the parameters can be used.
-  std::vector<std::string> finish() const;
-
- private:
-  template <class T>
-  bool convert(const std::string& name, T& value, const char* expected) {
-    known_.insert(name);
-    if (!has(name)) return true;
-    try {
-      // Older yaml-cpp lets a minus sign wrap round to a huge unsigned number.
-      constexpr bool is_unsigned_number = std::is_unsigned_v<T> && !std::is_same_v<T, bool>;
-      if (is_unsigned_number && text(name).rfind('-', 0) == 0) throw YAML::BadConversion(map_[name].Mark());
-      value = map_[name].as<T>();
-      return true;
-    } catch (const YAML::Exception&) {
-      bad_value(name, std::string("must be ") + expected);
-      return false;
-    }
-  }
-
-  template <class E>
-  void read_enum(const std::string& name, E& value) {
-    known_.insert(name);
-    if (!has(name)) return;
-    std::string choices;
-    for (const auto& [choice, candidate] : enum_names(value)) {
-      if (text(name) == choice) {
-        value = candidate;
-        return;
-      }
-      choices += (choices.empty() ? "" : ", ") + std::string(choice);
-    }
-    bad_value(name, "must be one of " + choices);
-  }
-
-  /// `file:line: `, as far as it is known.
-  std::string at(const YAML::Node& place) const;
-  /// The place of the value under the name; of the map where it has none.
-  std::string at(const std::string& name) const;
-  std::string text(const std::string& name) const;
-  void bad_value(const std::string& name, const std::string& text);
-
-  YAML::Node map_;
-  std::string source_;
-  std::string path_;
-  std::set<std::string> known_;
-  std::vector<std::string> faults_;
+/// What is known of a parameter beside its value and range.
+struct ParameterKey {
+  const char* name;
+  const char* unit;     ///< "m", "rad/s"; "" for a text, a choice or a count without unit
+  const char* meaning;  ///< one sentence, with symbol and equation where it has one
+  bool is_basic;        ///< tier one: what a user sets. The others stand below `expert:`
 };
 
-/// Writes parameter structs as YAML text, one `name: value` a line: what a run's report says it ran with.
-class ParameterWriter {
+/// Goes through a struct of parameters: to read it, to write it, to check it, to document it.
+///
+/// A parameter struct lists its fields once, in `void visit(ParameterVisitor& v)`:
+///   v("gate_timeout", gate_timeout, positive(), "s", "of nothing but rejections after which the filter starts anew");
+///   v("mode", mode, "which filter");                                          // enumeration, bool or text
+///   v.basic()("datum", datum, "deg, deg, m", "origin of the map frame");      // tier one; a list of numbers
+///   v.group("noise", noise, "what a receiver's covariance is worth");         // a struct below a name of its own
+///   v.include(motion);                                                        // a struct beside the fields
+/// and its conditions between fields in `void check(std::vector<std::string>& faults) const`, where it has any; a fault
+/// begins with the field's name. Ranges and conditions of all structs within are checked by whoever visits.
+class ParameterVisitor {
  public:
-  template <class P>
-  ParameterWriter& write(P parameters) {
-    parameters.visit(*this);
-    return *this;
+  virtual ~ParameterVisitor() = default;
+
+  void operator()(const char* name, double& value, const Range& range, const char* unit, const char* meaning) {
+    on_number(key(name, unit, meaning), value, range);
+  }
+  void operator()(const char* name, int& value, const Range& range, const char* unit, const char* meaning) {
+    on_integer(key(name, unit, meaning), value, range);
+  }
+  void operator()(const char* name, std::vector<double>& value, const char* unit, const char* meaning) {
+    on_list(key(name, unit, meaning), value);
   }
   template <class T>
-  void operator()(const std::string& name, T& value, const Range&) {
-    (*this)(name, value);
-  }
-  template <class T>
-  void operator()(const std::string& name, T& value) {
+  void operator()(const char* name, T& value, const char* meaning) {
     if constexpr (std::is_enum_v<T>) {
-      map_[name] = std::string(enum_name(value));
+      const EnumNames<T> names = enum_names(value);
+      std::vector<const char*> choices;
+      std::size_t chosen = 0;
+      for (std::size_t i = 0; i < names.size(); ++i) {
+        choices.push_back(names[i].first);
+        if (names[i].second == value) chosen = i;
+      }
+      on_choice(key(name, "", meaning), chosen, choices);
+      value = names[chosen].second;
+    } else if constexpr (std::is_same_v<T, bool>) {
+      on_boolean(key(name, "", meaning), value);
     } else {
-      map_[name] = value;
+      static_assert(std::is_same_v<T, std::string>, "a number needs a range and a unit, a list a unit");
+      on_text(key(name, "", meaning), value);
     }
   }
-  const YAML::Node& map() const { return map_; }
+
+  /// The next parameter is one of tier one.
+  ParameterVisitor& basic() {
+    next_is_basic_ = true;
+    return *this;
+  }
+
+  template <class P>
+  void group(const char* name, P& parameters, const char* meaning) {
+    on_begin(name, meaning);
+    parameters.visit(*this);
+    on_end(conditions_broken_by(parameters));
+  }
+
+  template <class P>
+  void include(P& parameters) {
+    group(nullptr, parameters, "");
+  }
+
+ protected:
+  virtual void on_number(const ParameterKey& key, double& value, const Range& range) = 0;
+  virtual void on_integer(const ParameterKey& key, int& value, const Range& range) = 0;
+  virtual void on_list(const ParameterKey& key, std::vector<double>& value) = 0;
+  virtual void on_boolean(const ParameterKey& key, bool& value) = 0;
+  virtual void on_text(const ParameterKey& key, std::string& value) = 0;
+  /// `chosen` is an index of `choices`.
+  virtual void on_choice(const ParameterKey& key, std::size_t& chosen, const std::vector<const char*>& choices) = 0;
+  /// A struct begins; below no name of its own where `group` is null.
+  virtual void on_begin(const char* group, const char* meaning) = 0;
+  /// It ends; `faults` are the conditions that its fields break.
+  virtual void on_end(const std::vector<std::string>& faults) = 0;
 
  private:
-  YAML::Node map_;
+  ParameterKey key(const char* name, const char* unit, const char* meaning) {
+    return {name, unit, meaning, std::exchange(next_is_basic_, false)};
+  }
+
+  template <class P>
+  static auto check_of(const P& parameters, std::vector<std::string>& faults, int)
+      -> decltype(parameters.check(faults)) {
+    parameters.check(faults);
+  }
+  template <class P>
+  static void check_of(const P&, std::vector<std::string>&, long) {}
+  template <class P>
+  static std::vector<std::string> conditions_broken_by(const P& parameters) {
+    std::vector<std::string> faults;
+    check_of(parameters, faults, 0);
+    return faults;
+  }
+
+  bool next_is_basic_{false};
 };
 
 /// Thrown where parameters cannot be used; what() lists every fault, one a line.
@@ -197,5 +154,39 @@ class ParameterError : public std::runtime_error {
  public:
   ParameterError(const std::string& where, const std::vector<std::string>& faults);
 };
+
+/// Collects what is wrong with the values of structs: ranges and conditions.
+class ParameterCheck : public ParameterVisitor {
+ public:
+  const std::vector<std::string>& faults() const { return faults_; }
+
+ protected:
+  void on_number(const ParameterKey& key, double& value, const Range& range) override;
+  void on_integer(const ParameterKey& key, int& value, const Range& range) override;
+  void on_list(const ParameterKey& key, std::vector<double>& value) override;
+  void on_boolean(const ParameterKey&, bool&) override {}
+  void on_text(const ParameterKey&, std::string&) override {}
+  void on_choice(const ParameterKey&, std::size_t&, const std::vector<const char*>&) override {}
+  void on_begin(const char*, const char*) override {}
+  void on_end(const std::vector<std::string>& faults) override;
+
+ private:
+  std::vector<std::string> faults_;
+};
+
+/// What is wrong with the values of a struct; empty where it can be used.
+template <class P>
+std::vector<std::string> faults_of(P parameters) {
+  ParameterCheck check;
+  check.include(parameters);
+  return check.faults();
+}
+
+/// Throws ParameterError where the values of a struct cannot be used; `where` says whose they are.
+template <class P>
+void require_usable(const std::string& where, const P& parameters) {
+  const std::vector<std::string> faults = faults_of(parameters);
+  if (!faults.empty()) throw ParameterError(where, faults);
+}
 
 }  // namespace urban_gnss

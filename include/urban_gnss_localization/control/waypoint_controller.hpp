@@ -8,23 +8,25 @@
 namespace urban_gnss {
 
 struct WaypointControllerParameters {
-  double speed{1.0};            ///< m/s, constant, eq. (37)
-  double steering_gain{0.8};    ///< k_phi
-  double max_steering{1.2};     ///< rad
-  double wheelbase{1.0};        ///< m, turns the steering angle into the yaw rate of cmd_vel
-  double switch_distance{0.5};  ///< m, between the estimate and a target, at which the next target becomes current
-  int laps{0};                  ///< rounds over all targets after which it stops; 0 goes on for ever
-  std::vector<double> targets;  ///< m, x and y of each target in turn, map frame
+  double speed{1.0};
+  double steering_gain{0.8};
+  double max_steering{1.2};
+  double wheelbase{1.0};
+  double switch_distance{0.5};
+  int laps{0};
+  std::vector<double> targets;
 
-  template <class V>
-  void visit(V& v) {
-    v("speed", speed, positive());
-    v("steering_gain", steering_gain, positive());
-    v("max_steering", max_steering, Range{0.0, 1.5, true});
-    v("wheelbase", wheelbase, positive());
-    v("switch_distance", switch_distance, positive());
-    v("laps", laps, non_negative());
-    v("targets", targets);
+  void visit(ParameterVisitor& v) {
+    v.basic()("speed", speed, positive(), "m/s", "v, constant, eq. (37)");
+    v.basic()("steering_gain", steering_gain, positive(), "",
+      "k_phi, eq. (36): steering angle per angle from heading to bearing, eq. (38)");
+    v.basic()("max_steering", max_steering, open_between(0.0, 1.5), "rad", "limit of the steering angle");
+    v.basic()("wheelbase", wheelbase, positive(), "m", "l of eq. (4): turns the steering angle into the yaw rate of cmd_vel");
+    v.basic()("switch_distance", switch_distance, positive(), "m",
+      "between estimate and target, at which the next target becomes current");
+    v.basic()("laps", laps, non_negative(), "", "rounds after which it stops; 0: never");
+    v.basic()("targets", targets, "m",
+              "x1, y1, x2, y2, ... in the map frame; empty: the robot stands");
   }
   void check(std::vector<std::string>& faults) const;
 

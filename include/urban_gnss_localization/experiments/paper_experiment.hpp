@@ -1,13 +1,15 @@
 #pragma once
 
+#include <yaml-cpp/yaml.h>
+
 #include <functional>
-#include <map>
 #include <string>
 #include <vector>
 
 #include "urban_gnss_localization/control/waypoint_controller.hpp"
 #include "urban_gnss_localization/localizers/nishida/bias_kalman_filter.hpp"
 #include "urban_gnss_localization/localizers/nishida/particle_filter.hpp"
+#include "urban_gnss_localization/localizers/switching/switching_particle_filter.hpp"
 #include "urban_gnss_localization/simulation/paper_field.hpp"
 
 namespace urban_gnss {
@@ -16,27 +18,30 @@ namespace urban_gnss {
 struct PaperExperimentConditions {
   PaperFieldParameters field;
   MotionParameters field_motion;   ///< of the robot
-  MotionParameters filter_motion;  ///< that the filters assume
+  MotionParameters filter_motion;  ///< that the particle filter assumes
   GpsBiasParameters bias;
   ParticleFilterParameters filter;
+  SwitchingParticleFilterParameters switching;
+  MotionParameters switching_motion;  ///< that they assume
   WaypointControllerParameters controller;
   int laps{3};
   bool closed_loop{true};  ///< steer on the estimate; otherwise on the truth
 };
 
-/// The YAML files of config/paper_field that the experiment shares with the nodes, by their names.
-using PaperFiles = std::map<std::string, YAML::Node>;
-inline constexpr const char* kPaperFileNames[] = {"simulator", "particle_filter", "gps_bias", "waypoint_controller"};
+/// The YAML files of config/paper_field that the experiment shares with the nodes.
+inline constexpr const char* kPaperFileNames[] = {"simulator", "particle_filter", "switching_particle_filter",
+                                                  "gps_bias", "waypoint_controller"};
 
-/// The conditions that the files describe; the targets are the field's. Throws ParameterError with every fault of all
-/// files.
-PaperExperimentConditions read_paper_conditions(const PaperFiles& files);
+/// The conditions that the files describe, a map of their names to their contents; the targets are the field's. Throws
+/// ParameterError with every fault of all files.
+PaperExperimentConditions read_paper_conditions(const YAML::Node& files);
 
 /// A way to estimate the pose, by the name that tables and files use.
 struct PaperMethod {
   enum class Kind {
-    kFilter,         ///< a particle filter
-    kImm,            ///< an interacting multiple model, of the particle filter's parameters
+    kFilter,         ///< the particle filter of Nishida et al.
+    kSwitching,      ///< the switching particle filter
+    kImm,            ///< interacting multiple models, with the switching particle filter's model
     kDeadReckoning,  ///< the inputs alone, from a start as uncertain as one particle's
     kOracleZone,     ///< knows the zone: drops the fix in the shadow
     kOracle,         ///< knows zone and bias: takes the bias off and uses the right noise

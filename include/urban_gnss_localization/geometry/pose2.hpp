@@ -37,8 +37,8 @@ inline Pose2 inverse(const Pose2& a) {
   return {-c * a.x - s * a.y, s * a.x - c * a.y, wrap_angle(-a.yaw)};
 }
 
-/// b as seen from a: compose(a, between(a, b)) = b.
-inline Pose2 between(const Pose2& a, const Pose2& b) { return compose(inverse(a), b); }
+/// b as seen from a: compose(a, relative_pose(a, b)) = b.
+inline Pose2 relative_pose(const Pose2& a, const Pose2& b) { return compose(inverse(a), b); }
 
 inline bool is_finite(const Pose2& pose) {
   return std::isfinite(pose.x) && std::isfinite(pose.y) && std::isfinite(pose.yaw);

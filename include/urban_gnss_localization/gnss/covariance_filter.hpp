@@ -11,19 +11,18 @@ namespace urban_gnss {
 
 /// The constants of Maier and Kleiner 2010, Algorithm 3, by the paper's values.
 struct CovarianceFilterParameters {
-  double sigma_infinite{600.0};     ///< m per axis, R_inf = sigma_infinite^2 I: a fix without weight
-  double sigma_threshold{6.0};      ///< m, sigma_thresh: a fix above it is bad
-  double sigma_smooth{9.0};         ///< m, sigma_smooth: a run of fixes above it leaves a receiver that must recover
-  double smooth_length_scale{0.2};  ///< len_scale: fixes of recovery for each fix of the run
-  double smooth_length_max{12.0};   ///< len_max: most fixes of recovery
+  double sigma_infinite{600.0};
+  double sigma_threshold{6.0};
+  double sigma_smooth{9.0};
+  double smooth_length_scale{0.2};
+  double smooth_length_max{12.0};
 
-  template <class V>
-  void visit(V& v) {
-    v("sigma_infinite", sigma_infinite, positive());
-    v("sigma_threshold", sigma_threshold, positive());
-    v("sigma_smooth", sigma_smooth, positive());
-    v("smooth_length_scale", smooth_length_scale, non_negative());
-    v("smooth_length_max", smooth_length_max, between(0.0, 1e6));
+  void visit(ParameterVisitor& v) {
+    v("sigma_infinite", sigma_infinite, positive(), "m per axis", "of a fix without weight");
+    v("sigma_threshold", sigma_threshold, positive(), "m", "a fix above it is bad");
+    v("sigma_smooth", sigma_smooth, positive(), "m", "fixes above it leave a receiver that must recover");
+    v("smooth_length_scale", smooth_length_scale, non_negative(), "", "fixes of recovery for each such fix");
+    v("smooth_length_max", smooth_length_max, between(0.0, 1e6), "", "fixes of recovery at most");
   }
   void check(std::vector<std::string>& faults) const;
 

@@ -12,18 +12,14 @@ namespace urban_gnss {
 
 /// Where the map frame's origin comes from.
 struct DatumParameters {
-  /// latitude in deg, longitude in deg, altitude above the ellipsoid in m; empty: from the first fixes that agree
   std::vector<double> datum;
-  /// count of fixes that must agree
   int datum_fix_count{5};
-  /// m, farthest that one of these fixes may lie from their median
   double datum_max_spread{15.0};
 
-  template <class V>
-  void visit(V& v) {
-    v("datum", datum);
-    v("datum_fix_count", datum_fix_count, between(1, 1000));
-    v("datum_max_spread", datum_max_spread, positive());
+  void visit(ParameterVisitor& v) {
+    v("datum", datum, "deg", "deg, m: latitude, longitude, altitude; empty: gps/datum or the first fixes");
+    v("datum_fix_count", datum_fix_count, between(1, 1000), "", "of fixes that must agree on it");
+    v("datum_max_spread", datum_max_spread, positive(), "m", "farthest that one of these may lie from their median");
   }
   void check(std::vector<std::string>& faults) const;
 };

@@ -37,7 +37,7 @@ struct RawVelocity {
   Eigen::Matrix2d covariance{Eigen::Matrix2d::Zero()};  ///< (m/s)^2; not positive definite: not declared
 };
 
-/// A fix in the map frame that passed sanitation: finite, with a positive definite covariance.
+/// A fix in the map frame that passed validation: finite, with a positive definite covariance.
 struct LocalFix {
   Stamp stamp{0};
   Eigen::Vector2d position{Eigen::Vector2d::Zero()};        ///< east, north of the datum, m

@@ -9,7 +9,8 @@
 
 #include "urban_gnss_localization/common/parameters.hpp"
 #include "urban_gnss_localization/gnss/covariance_filter.hpp"
-#include "urban_gnss_localization/gnss/receiver_memory.hpp"
+#include "urban_gnss_localization/gnss/nlos_model.hpp"
+#include "urban_gnss_localization/gnss/receiver_smoothing.hpp"
 #include "urban_gnss_localization/gnss/satellite.hpp"
 
 namespace urban_gnss {
@@ -37,48 +38,43 @@ const char* to_string(VisibilitySource source);
 
 struct GnssCovarianceParameters {
   CovarianceModel model{CovarianceModel::kSoft};
-  double sigma_ure{3.75};         ///< m, of a range in line of sight
-  double blocked_threshold{0.5};  ///< a satellite of which so large a share of rays is blocked is not visible
-  bool allow_smaller{false};      ///< than what the receiver claims
-  double assumed_hdop{1.2};       ///< where neither the receiver nor satellites tell
+  double sigma_ure{3.75};
+  double blocked_threshold{0.5};
+  bool allow_smaller{false};
+  double assumed_hdop{1.2};
   ReceiverWeighting receiver_weighting{ReceiverWeighting::kCn0};
-  double weight_cn0{40.0};              ///< dB-Hz, from here on the receiver weighs ranges equally
-  double weight_floor{0.01};            ///< least weight of a range, of 1
-  double nlos_mean{25.0};               ///< m, of the range error without line of sight
-  double nlos_sigma{25.0};              ///< m, about that mean
-  double nlos_hidden_exponent{0.0};     ///< both grow with this power of the hidden share of the satellites in view,
-  double nlos_elevation_exponent{0.0};  ///< and with this power of the cotangent of the elevation, 1 at 37 degrees
-  double nlos_cn0{28.0};                ///< dB-Hz, at which a signal at 37 degrees is as likely reflected as direct
-  double nlos_cn0_width{3.0};           ///< dB, that change the odds by e
-  double nlos_cn0_rise{-4.5};           ///< dB, by which nlos_cn0 rises from the horizon to the zenith
-  double nlos_if_blocked{0.9};          ///< probability of no line of sight where the map blocks it,
-  double nlos_if_free{0.005};           ///< where the map shows free space,
-  double nlos_if_unknown{0.1};          ///< and where it shows nothing
-  ReceiverMemoryParameters memory;
+  double weight_cn0{40.0};
+  double weight_floor{0.01};
+  NlosParameters nlos{25.0, 25.0, NlosElevationLaw::kCotangent, 0.0, 3.0, -4.5};
+  double nlos_hidden_exponent{0.0};
+  double nlos_cn0{28.0};
+  double nlos_if_blocked{0.9};
+  double nlos_if_free{0.005};
+  double nlos_if_unknown{0.1};
+  ReceiverSmoothingParameters smoothing;
   CovarianceFilterParameters filter;
 
-  template <class V>
-  void visit(V& v) {
-    v("model", model);
-    v("sigma_ure", sigma_ure, positive());
-    v("blocked_threshold", blocked_threshold, Range{0.0, 1.0, true});
-    v("allow_smaller", allow_smaller);
-    v("assumed_hdop", assumed_hdop, positive());
-    v("receiver_weighting", receiver_weighting);
-    v("weight_cn0", weight_cn0, between(0.0, 70.0));
-    v("weight_floor", weight_floor, between(1e-6, 1.0));
-    v("nlos_mean", nlos_mean, non_negative());
-    v("nlos_sigma", nlos_sigma, positive());
-    v("nlos_hidden_exponent", nlos_hidden_exponent, between(0.0, 5.0));
-    v("nlos_elevation_exponent", nlos_elevation_exponent, between(0.0, 5.0));
-    v("nlos_cn0", nlos_cn0, between(0.0, 70.0));
-    v("nlos_cn0_width", nlos_cn0_width, positive());
-    v("nlos_cn0_rise", nlos_cn0_rise, between(-30.0, 30.0));
-    v("nlos_if_blocked", nlos_if_blocked, between(0.001, 0.999));
-    v("nlos_if_free", nlos_if_free, between(0.001, 0.999));
-    v("nlos_if_unknown", nlos_if_unknown, between(0.001, 0.999));
-    memory.visit(v);
-    filter.visit(v);
+  void visit(ParameterVisitor& v) {
+    v.basic()("model", model, "soft, paper: eq. (6) and Algorithm 3, or conventional: eq. (4)");
+    v.basic()("sigma_ure", sigma_ure, positive(), "m", "standard deviation of a range in line of sight");
+    v("blocked_threshold", blocked_threshold, open_between(0.0, 1.0), "",
+      "paper: a satellite with so large a share of blocked rays is not visible");
+    v("allow_smaller", allow_smaller, "whether the result may be below the receiver's own covariance");
+    v("assumed_hdop", assumed_hdop, positive(), "", "where neither the receiver nor satellites tell");
+    v("receiver_weighting", receiver_weighting, "soft: how the receiver is taken to weigh its ranges, equal or cn0");
+    v("weight_cn0", weight_cn0, between(0.0, 70.0), "dB-Hz", "from here on it weighs ranges equally");
+    v("weight_floor", weight_floor, between(1e-6, 1.0), "", "its least weight of a range, of 1");
+    v.group("nlos", nlos, "The excess range of an NLOS signal.");
+    v("nlos_hidden_exponent", nlos_hidden_exponent, between(0.0, 5.0), "",
+      "excess ranges grow with this power of the hidden share of the satellites in view");
+    v("nlos_cn0", nlos_cn0, between(0.0, 70.0), "dB-Hz",
+      "at which a signal at 37 degrees elevation is as likely NLOS as not");
+    v("nlos_if_blocked", nlos_if_blocked, between(0.001, 0.999), "",
+      "probability of no line of sight where the map blocks it");
+    v("nlos_if_free", nlos_if_free, between(0.001, 0.999), "", "where the map shows free space");
+    v("nlos_if_unknown", nlos_if_unknown, between(0.001, 0.999), "", "where the map shows nothing");
+    v.group("smoothing", smoothing, "How the receiver smooths its solutions.");
+    v.group("filter", filter, "paper: the filter of the covariance, Algorithm 3.");
   }
   void check(std::vector<std::string>& faults) const;
 };
@@ -150,16 +146,16 @@ GnssCovariance gnss_covariance(const std::vector<SatelliteObservation>& satellit
 
 /// The least covariance that is nowhere below either: matrix - result and floor - result have no positive eigenvalue.
 /// Requires both positive definite and finite.
-Eigen::Matrix2d at_least(const Eigen::Matrix2d& matrix, const Eigen::Matrix2d& floor);
+Eigen::Matrix2d covariance_upper_bound(const Eigen::Matrix2d& matrix, const Eigen::Matrix2d& floor);
 
-/// gnss_covariance() fix by fix, with the memory of a receiver: Algorithm 3 in the paper's model, ReceiverMemory in the
-/// soft one. There, a fix whose satellites do not determine the position has R_inf alone and leaves no memory: the
+/// gnss_covariance() fix by fix, with the memory of a receiver: Algorithm 3 in the paper's model, ReceiverSmoothing in
+/// the soft one. There, a fix whose satellites do not determine the position has R_inf alone and leaves no memory: the
 /// receiver cannot have had a solution either.
 class GnssCovarianceModel {
  public:
   /// Requires parameters without faults.
   explicit GnssCovarianceModel(const GnssCovarianceParameters& parameters)
-      : parameters_(parameters), filter_(parameters.filter), memory_(parameters.memory) {}
+      : parameters_(parameters), filter_(parameters.filter), smoothing_(parameters.smoothing) {}
 
   GnssCovariance process(Stamp stamp, const std::vector<SatelliteObservation>& satellites,
                          const std::optional<SkyObservation>& sky, const std::optional<Eigen::Matrix2d>& claimed);
@@ -168,7 +164,7 @@ class GnssCovarianceModel {
  private:
   GnssCovarianceParameters parameters_;
   CovarianceFilter filter_;
-  ReceiverMemory memory_;
+  ReceiverSmoothing smoothing_;
 };
 
 }  // namespace urban_gnss

@@ -14,18 +14,16 @@ namespace urban_gnss {
 
 /// When the heading found from motion is good enough, and when not to wait for it any longer.
 struct HeadingInitializerParameters {
-  /// rad, standard deviation of the yaw below which there is an initial pose
   double initialization_heading_sigma{0.2};
-  /// s, time from the first fix after which the caller should do without a heading
   double initialization_timeout{60.0};
-  /// s, time for which fixes are remembered: as long as odometry's own drift is small beside the fixes' errors
   double initialization_window{60.0};
 
-  template <class V>
-  void visit(V& v) {
-    v("initialization_heading_sigma", initialization_heading_sigma, Range{0.0, 1.0, true});
-    v("initialization_timeout", initialization_timeout, positive());
-    v("initialization_window", initialization_window, positive());
+  void visit(ParameterVisitor& v) {
+    v("initialization_heading_sigma", initialization_heading_sigma, open_between(0.0, 1.0), "rad",
+      "start from motion once the heading is known this well");
+    v("initialization_timeout", initialization_timeout, positive(), "s",
+      "after the first fix at which it starts without a heading");
+    v("initialization_window", initialization_window, positive(), "s", "of fixes that the start is found from");
   }
   void check(std::vector<std::string>& faults) const;
 };

@@ -68,4 +68,13 @@ struct SatelliteObservation {
   double residual_m{kUnknown};
 };
 
+/// Whether the satellite's direction is known and on or above the horizon.
+bool has_direction(const SatelliteObservation& satellite);
+
+/// Whether its C/N0 is known; receivers report 0 where it is not.
+bool has_cn0(const SatelliteObservation& satellite);
+
+/// Whether there is a signal of it, with direction and C/N0.
+bool is_received(const SatelliteObservation& satellite);
+
 }  // namespace urban_gnss

@@ -82,6 +82,8 @@ class Localizer {
   /// Whether it makes use of the satellites of a fix.
   virtual bool takes_satellites() const { return false; }
 
+  /// Whether it estimates the bias of the fixes itself.
+  virtual bool estimates_bias() const { return false; }
   /// The biases that it found itself since the last call, one a fix; none where it does not estimate them.
   virtual std::vector<BiasEstimate> take_bias_estimates() { return {}; }
 

@@ -5,6 +5,10 @@
 
 namespace urban_gnss {
 
+/// What of the particles is the estimate.
+enum class EstimateMethod { kMean, kHeaviestCluster };
+EnumNames<EstimateMethod> enum_names(EstimateMethod);
+
 /// What every particle filter publishes beside its pose.
 class ParticleLocalizer : public Localizer {
  public:

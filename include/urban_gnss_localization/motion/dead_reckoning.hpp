@@ -2,37 +2,9 @@
 
 #include <Eigen/Core>
 
-#include "urban_gnss_localization/common/parameters.hpp"
 #include "urban_gnss_localization/motion/odometry_errors.hpp"
 
 namespace urban_gnss {
-
-/// Noise of the odometry, and what is systematically wrong with it. Densities are standard deviations after one second.
-struct DeadReckoningParameters {
-  double odom_speed_noise{0.02};        ///< share of the speed, /sqrt(Hz): diagonal of Sigma_v
-  double odom_yaw_rate_noise{0.03};     ///< share of the yaw rate, /sqrt(Hz): diagonal of Sigma_v
-  double odom_position_noise{0.05};     ///< m/sqrt(s) per axis, while moving: Sigma_N
-  double odom_heading_noise{0.003};     ///< rad/sqrt(s), while moving: Sigma_N
-  bool estimate_odometry_errors{true};  ///< speed scale and yaw-rate bias as states; false: the paper's (x, y, heading)
-  double odom_scale_sigma{0.02};        ///< 1, of the speed scale's error at the start
-  double odom_scale_walk{2e-4};         ///< 1/sqrt(s), how fast it changes
-  double odom_yaw_bias_sigma{0.005};    ///< rad/s, of the yaw rate's bias at the start
-  double odom_yaw_bias_walk{3e-5};      ///< rad/s/sqrt(s), how fast it changes
-
-  template <class V>
-  void visit(V& v) {
-    v("odom_speed_noise", odom_speed_noise, non_negative());
-    v("odom_yaw_rate_noise", odom_yaw_rate_noise, non_negative());
-    v("odom_position_noise", odom_position_noise, non_negative());
-    v("odom_heading_noise", odom_heading_noise, non_negative());
-    v("estimate_odometry_errors", estimate_odometry_errors);
-    v("odom_scale_sigma", odom_scale_sigma, non_negative());
-    v("odom_scale_walk", odom_scale_walk, non_negative());
-    v("odom_yaw_bias_sigma", odom_yaw_bias_sigma, non_negative());
-    v("odom_yaw_bias_walk", odom_yaw_bias_walk, non_negative());
-  }
-  void check(std::vector<std::string>&) const {}
-};
 
 /// Order of the error states: x (m), y (m), yaw (rad), speed scale (1), yaw-rate bias (rad/s).
 inline constexpr int kErrorStates = 5;
@@ -48,21 +20,14 @@ struct DeadReckoningStep {
   Eigen::Vector3d yaw_rate_scale;  ///< how an error of the yaw rate's scale (1) shows in the pose after it
 };
 
-/// Whether the wheels stand: the odometry then has no error, neither noise nor bias.
-bool is_standstill(const Twist2& twist);
-
-/// Dead-reckons `duration_s` >= 0 at the measured twist, corrected by `errors`. Without estimate_odometry_errors their
-/// rows of the noise are 0.
-DeadReckoningStep dead_reckon(const Pose2& pose, const OdometryErrors& errors, const Twist2& measured,
-                              double duration_s, const DeadReckoningParameters& parameters);
-
-/// The same with the noise of the motion model, eq. (5)-(7) of Nishida et al., linearised; parked where the robot is.
+/// Dead-reckons one step of the measured twist, corrected by `errors`, with the noise of the motion model, eq. (5)-(7)
+/// of Nishida et al., linearised, and with the walks of `parameters`. The Sigma_v of Kim et al. is the motion model's
+/// with odom_alpha1 for the speed and odom_alpha4 for the yaw rate alone; their Sigma_N are position_walk and
+/// heading_walk. At a standstill the pose stays, and nothing but parked_walk is added.
 DeadReckoningStep dead_reckon(const Pose2& pose, const OdometryErrors& errors, const MotionStep& step,
                               const OdometryErrorParameters& parameters);
 
 /// Covariance of pose and odometry errors at a start whose pose has the given covariance.
-ErrorCovariance initial_error_covariance(const Eigen::Matrix3d& pose_covariance,
-                                         const DeadReckoningParameters& parameters);
 ErrorCovariance initial_error_covariance(const Eigen::Matrix3d& pose_covariance,
                                          const OdometryErrorParameters& parameters);
 

@@ -44,7 +44,7 @@ EnumNames<MotionModel> enum_names(MotionModel);
 /// times `odom_noise_scale`. A step of another length gets the variance that diffuses as much per second.
 struct MotionParameters {
   MotionModel motion_model{MotionModel::kVelocity};
-  double wheelbase{1.0};  ///< m, used by kBicycle
+  double wheelbase{1.0};
   double odom_alpha1{1e-3};
   double odom_alpha2{1e-3};
   double odom_alpha3{1e-5};
@@ -52,23 +52,40 @@ struct MotionParameters {
   double odom_alpha5{1e-5};
   double odom_alpha6{1e-3};
   double odom_noise_scale{1.0};
-  double odom_noise_interval{1.0};  ///< s
+  double odom_noise_interval{1.0};
 
-  template <class V>
-  void visit(V& v) {
-    v("motion_model", motion_model);
-    v("wheelbase", wheelbase, positive());
-    v("odom_alpha1", odom_alpha1, non_negative());
-    v("odom_alpha2", odom_alpha2, non_negative());
-    v("odom_alpha3", odom_alpha3, non_negative());
-    v("odom_alpha4", odom_alpha4, non_negative());
-    v("odom_alpha5", odom_alpha5, non_negative());
-    v("odom_alpha6", odom_alpha6, non_negative());
-    v("odom_noise_scale", odom_noise_scale, non_negative());
-    v("odom_noise_interval", odom_noise_interval, positive());
+  void visit(ParameterVisitor& v) {
+    v("motion_model", motion_model, "noise on speed and yaw rate (velocity), or on speed and steering angle (bicycle)");
+    v("wheelbase", wheelbase, positive(), "m", "l of eq. (4), for bicycle");
+    v("odom_alpha1", odom_alpha1, non_negative(), "", "variance of the speed, (m/s)^2 per (m/s)^2 of speed, eq. (5)");
+    v("odom_alpha2", odom_alpha2, non_negative(), "",
+      "variance of the speed per squared yaw rate (velocity) or steering angle (bicycle)");
+    v("odom_alpha3", odom_alpha3, non_negative(), "",
+      "variance of the yaw rate or steering angle per squared speed, eq. (6)");
+    v("odom_alpha4", odom_alpha4, non_negative(), "", "variance of the yaw rate or steering angle per its own square");
+    v("odom_alpha5", odom_alpha5, non_negative(), "",
+      "variance of the additional yaw rate, (rad/s)^2, per squared speed, eq. (7)");
+    v("odom_alpha6", odom_alpha6, non_negative(), "",
+      "variance of the additional yaw rate per squared yaw rate or steering angle");
+    v("odom_noise_scale", odom_noise_scale, non_negative(), "", "factor on all six");
+    v("odom_noise_interval", odom_noise_interval, positive(), "s",
+      "length of the step that these variances are meant for");
   }
-  void check(std::vector<std::string>&) const {}
 };
+
+/// A struct of parameters with those of the motion noise, in a group of their own.
+template <class P>
+struct WithMotion {
+  P& parameters;
+  MotionParameters& motion;
+
+  void visit(ParameterVisitor& v) {
+    v.include(parameters);
+    v.group("motion", motion, "Noise of the motion, Nishida et al. eq. (5) to (8).");
+  }
+};
+template <class P>
+WithMotion(P&, MotionParameters&) -> WithMotion<P>;
 
 /// One step of odometry with the standard deviations of its noise: what the noisy motion of eq. (8) needs.
 struct MotionStep {

@@ -13,25 +13,24 @@ namespace urban_gnss {
 /// Parameters of Algorithm 2. The search radius is bounded and linear in the range r:
 /// min(search_radius + search_radius_slope r, search_radius_max).
 struct KdTreeRayTracerParameters {
-  double min_range{1.0};             ///< m, nearer is the robot itself
-  double max_range{500.0};           ///< m
-  double range_step{0.5};            ///< m, r_inc
-  double search_radius{0.3};         ///< m, at the antenna
-  double search_radius_slope{0.02};  ///< 0 keeps the radius fixed
-  double search_radius_max{2.0};     ///< m
-  int min_neighbours{1};             ///< so many points within the radius obstruct
-  double epsilon{0.0};               ///< the search may be wrong by the factor 1 + epsilon (Arya et al. 1998)
+  double min_range{1.0};
+  double max_range{500.0};
+  double range_step{0.5};
+  double search_radius{0.3};
+  double search_radius_slope{0.02};
+  double search_radius_max{2.0};
+  int min_neighbours{1};
+  double epsilon{0.0};
 
-  template <class V>
-  void visit(V& v) {
-    v("min_range", min_range, non_negative());
-    v("max_range", max_range, positive());
-    v("range_step", range_step, positive());
-    v("search_radius", search_radius, positive());
-    v("search_radius_slope", search_radius_slope, non_negative());
-    v("search_radius_max", search_radius_max, positive());
-    v("min_neighbours", min_neighbours, at_least(1));
-    v("epsilon", epsilon, non_negative());
+  void visit(ParameterVisitor& v) {
+    v("min_range", min_range, non_negative(), "m", "what is nearer to the antenna is the robot itself");
+    v("max_range", max_range, positive(), "m", "how far a ray is followed");
+    v("range_step", range_step, positive(), "m", "r_inc");
+    v("search_radius", search_radius, positive(), "m", "at the antenna");
+    v("search_radius_slope", search_radius_slope, non_negative(), "", "0 keeps the radius fixed");
+    v("search_radius_max", search_radius_max, positive(), "", "m");
+    v("min_neighbours", min_neighbours, at_least(1), "", "so many points within the radius obstruct");
+    v("epsilon", epsilon, non_negative(), "", "the search may be wrong by the factor 1 + epsilon (Arya et al. 1998)");
   }
   void check(std::vector<std::string>& faults) const;
 };

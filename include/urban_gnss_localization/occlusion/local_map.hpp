@@ -13,23 +13,23 @@
 namespace urban_gnss {
 
 struct LocalMapParameters {
-  double body_radius{1.0};       ///< m, horizontally from the robot's base: the robot itself
-  double min_height{0.3};        ///< m, in the base's frame: what is lower is ground
-  double max_scan_range{100.0};  ///< m, from the sensor
+  double body_radius{1.0};
+  double min_height{0.3};
+  double max_scan_range{100.0};
   bool align{true};
-  double align_radius{60.0};      ///< m, of the map that a scan is aligned to
-  double keyframe_distance{1.0};  ///< m, travelled from one alignment to the next
-  double keyframe_angle{0.17};    ///< rad, turned from one alignment to the next
+  double align_radius{60.0};
+  double keyframe_distance{1.0};
+  double keyframe_angle{0.17};
 
-  template <class V>
-  void visit(V& v) {
-    v("body_radius", body_radius, non_negative());
-    v("min_height", min_height, any_number());
-    v("max_scan_range", max_scan_range, positive());
-    v("align", align);
-    v("align_radius", align_radius, positive());
-    v("keyframe_distance", keyframe_distance, positive());
-    v("keyframe_angle", keyframe_angle, positive());
+  void visit(ParameterVisitor& v) {
+    v.basic()("body_radius", body_radius, non_negative(), "m",
+      "horizontally from base_link_frame: the robot itself is cut out");
+    v("min_height", min_height, any_number(), "", "m above base_link_frame: what is lower is ground");
+    v("max_scan_range", max_scan_range, positive(), "m", "from the sensor: what is farther is cut");
+    v("align", align, "align scans to the map, in place of the odometry alone");
+    v("align_radius", align_radius, positive(), "m", "about the sensor, the part of the map that a scan is aligned to");
+    v("keyframe_distance", keyframe_distance, positive(), "", "m travelled from one alignment to the next");
+    v("keyframe_angle", keyframe_angle, positive(), "", "rad turned from one alignment to the next");
   }
   void check(std::vector<std::string>& faults) const;
 };

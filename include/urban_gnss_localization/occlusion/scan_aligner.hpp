@@ -22,33 +22,34 @@ EnumNames<AlignmentFreedom> enum_names(AlignmentFreedom);
 struct ScanAlignerParameters {
   AlignmentFreedom freedom{AlignmentFreedom::kPlanar};
   int max_iterations{15};
-  int max_points{1500};               ///< of the scan, evenly chosen
-  int normal_neighbours{10};          ///< points of the map from which a plane is fitted
-  double max_distance{2.0};           ///< m, to the nearest point of the map, at the first iteration
-  double final_distance{0.8};         ///< m, at the last iteration and for the verdict
-  double inlier_distance{0.2};        ///< m, to the plane
-  double min_inlier_fraction{0.5};    ///< of the points near flat pieces of the map
-  double min_overlap{0.25};           ///< points near flat pieces of the map, of all
-  double max_residual{0.15};          ///< m, RMS of the inliers' distances to their planes
-  double min_conditioning{0.02};      ///< least share of the constraint in any direction; a corridor has none along it
-  double max_correction{2.0};         ///< m, of the guess
-  double max_correction_angle{0.17};  ///< rad
+  int max_points{1500};
+  int normal_neighbours{10};
+  double max_distance{2.0};
+  double final_distance{0.8};
+  double inlier_distance{0.2};
+  double min_inlier_fraction{0.5};
+  double min_overlap{0.25};
+  double max_residual{0.15};
+  double min_conditioning{0.02};
+  double max_correction{2.0};
+  double max_correction_angle{0.17};
 
-  template <class V>
-  void visit(V& v) {
-    v("freedom", freedom);
-    v("max_iterations", max_iterations, between(1, 1000));
-    v("max_points", max_points, at_least(50));
-    v("normal_neighbours", normal_neighbours, between(4, 50));
-    v("max_distance", max_distance, positive());
-    v("final_distance", final_distance, positive());
-    v("inlier_distance", inlier_distance, positive());
-    v("min_inlier_fraction", min_inlier_fraction, between(0.0, 1.0));
-    v("min_overlap", min_overlap, between(0.0, 1.0));
-    v("max_residual", max_residual, positive());
-    v("min_conditioning", min_conditioning, between(0.0, 1.0));
-    v("max_correction", max_correction, positive());
-    v("max_correction_angle", max_correction_angle, positive());
+  void visit(ParameterVisitor& v) {
+    v("freedom", freedom, "planar: x, y and yaw; full: all six");
+    v("max_iterations", max_iterations, between(1, 1000), "", "of an alignment");
+    v("max_points", max_points, at_least(50), "", "of the scan, evenly chosen");
+    v("normal_neighbours", normal_neighbours, between(4, 50), "", "points of the map from which a plane is fitted");
+    v("max_distance", max_distance, positive(), "", "m to the nearest point of the map, at the first iteration");
+    v("final_distance", final_distance, positive(), "", "m to it at the last iteration and for the checks");
+    v("inlier_distance", inlier_distance, positive(), "", "m to the plane");
+    v("min_inlier_fraction", min_inlier_fraction, between(0.0, 1.0), "",
+      "least share of inliers, of the points near flat pieces of the map");
+    v("min_overlap", min_overlap, between(0.0, 1.0), "", "least share of points near flat pieces of the map");
+    v("max_residual", max_residual, positive(), "m", "RMS of the inliers' distances to their planes");
+    v("min_conditioning", min_conditioning, between(0.0, 1.0), "",
+      "least share of the constraint in any direction; a corridor has none along it");
+    v("max_correction", max_correction, positive(), "m", "farthest from the odometry's guess");
+    v("max_correction_angle", max_correction_angle, positive(), "rad", "likewise");
   }
   void check(std::vector<std::string>& faults) const;
 };

@@ -22,19 +22,18 @@ struct AntennaPose {
 };
 
 struct VisibilityParameters {
-  int azimuth_samples{5};       ///< rays over the azimuth's uncertainty, for each satellite
-  int elevation_samples{3};     ///< over that of the elevation, which receivers round
-  double known_range{40.0};     ///< m of the way to a satellite that must have been looked at for it to be known
-  double permeable_loss{10.0};  ///< m of vegetation that block a signal as a wall does
+  int azimuth_samples{5};
+  int elevation_samples{3};
+  double known_range{40.0};
+  double permeable_loss{10.0};
 
-  template <class V>
-  void visit(V& v) {
-    v("azimuth_samples", azimuth_samples, between(1, 101));
-    v("elevation_samples", elevation_samples, between(1, 101));
-    v("known_range", known_range, positive());
-    v("permeable_loss", permeable_loss, positive());
+  void visit(ParameterVisitor& v) {
+    v("azimuth_samples", azimuth_samples, between(1, 101), "", "rays over the uncertainty of its azimuth");
+    v("elevation_samples", elevation_samples, between(1, 101), "", "rays over the uncertainty of its elevation");
+    v("known_range", known_range, positive(), "m",
+      "of the way to it that the lidar must have looked at for it to be known");
+    v("permeable_loss", permeable_loss, positive(), "m", "of vegetation that block a signal as a wall does");
   }
-  void check(std::vector<std::string>&) const {}
 };
 
 /// What the map says of the way to one satellite.

@@ -19,21 +19,21 @@
 namespace urban_gnss {
 
 struct VoxelMapParameters {
-  double voxel_size{0.5};     ///< m
-  double window{150.0};       ///< m, voxels farther than this from the sensor are dropped
-  int max_voxels{1500000};    ///< bound of the memory; the farthest are dropped beyond it
-  int ray_stride{20};         ///< every so many returns' ray is followed for permeability and observed space
-  double observed_cell{4.0};  ///< m, edge of the cubes of observed space
+  double voxel_size{0.5};
+  double window{150.0};
+  int max_voxels{1500000};
+  int ray_stride{20};
+  double observed_cell{4.0};
 
-  template <class V>
-  void visit(V& v) {
-    v("voxel_size", voxel_size, at_least(0.01));
-    v("window", window, positive());
-    v("max_voxels", max_voxels, between(1000, 100000000));
-    v("ray_stride", ray_stride, at_least(1));
-    v("observed_cell", observed_cell, at_least(0.1));
+  void visit(ParameterVisitor& v) {
+    v("voxel_size", voxel_size, at_least(0.01), "", "m");
+    v("window", window, positive(), "m", "voxels farther than this from the sensor are dropped");
+    v("max_voxels", max_voxels, between(1000, 100000000), "",
+      "bound of the memory; beyond it the farthest are dropped");
+    v("ray_stride", ray_stride, at_least(1), "",
+      "every so many returns' ray is followed, for vegetation and observed space");
+    v("observed_cell", observed_cell, at_least(0.1), "m", "edge of the cubes of observed space");
   }
-  void check(std::vector<std::string>&) const {}
 };
 
 /// What became of an inserted cloud.

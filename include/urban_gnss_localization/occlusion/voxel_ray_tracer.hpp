@@ -10,17 +10,18 @@
 namespace urban_gnss {
 
 struct VoxelRayTracerParameters {
-  double min_range{1.0};         ///< m, nearer is the robot itself
-  double max_range{500.0};       ///< m
-  double link_length{3.2};       ///< in voxels: farther apart, two points are not of one surface
-  double max_permeability{0.5};  ///< a voxel that lets a larger share of rays through is vegetation
+  double min_range{1.0};
+  double max_range{500.0};
+  double link_length{3.2};
+  double max_permeability{0.5};
 
-  template <class V>
-  void visit(V& v) {
-    v("min_range", min_range, non_negative());
-    v("max_range", max_range, positive());
-    v("link_length", link_length, between(1.0, VoxelMap::kCellVoxels));
-    v("max_permeability", max_permeability, between(0.0, 1.0));
+  void visit(ParameterVisitor& v) {
+    v("min_range", min_range, non_negative(), "m", "what is nearer to the antenna is the robot itself");
+    v("max_range", max_range, positive(), "m", "how far a ray is followed");
+    v("link_length", link_length, between(1.0, VoxelMap::kCellVoxels), "",
+      "in voxels: farther apart, two points are not of one surface");
+    v("max_permeability", max_permeability, between(0.0, 1.0), "",
+      "a voxel that lets a larger share of the lidar's rays through is vegetation");
   }
   void check(std::vector<std::string>& faults) const;
 };

@@ -25,7 +25,7 @@ struct BiasPipelineParameters {
     v.include(input);
     v("estimate_timeout", estimate_timeout, non_negative(), "s",
       "of odometry after a fix at which it alone carries the last estimate to the fix");
-    v.include(bias);
+    v.group("bias_filter", bias, "The Kalman filter of the bias, Nishida et al. eq. (14) to (21).");
   }
 };
 

@@ -4,7 +4,7 @@
 #include <optional>
 #include <vector>
 
-#include "urban_gnss_localization/gnss/fix_sanitation.hpp"
+#include "urban_gnss_localization/gnss/fix_validation.hpp"
 
 namespace urban_gnss {
 
@@ -13,7 +13,7 @@ namespace urban_gnss {
 class FixQueue {
  public:
   /// Requires parameters without faults.
-  explicit FixQueue(const FixSanitationParameters& parameters) : parameters_(parameters) {}
+  explicit FixQueue(const FixValidationParameters& parameters) : parameters_(parameters) {}
 
   void add(const RawFix& fix);
   /// Validates those that waited for the datum. Returns what was decided of those that are rejected, which wait no
@@ -21,9 +21,9 @@ class FixQueue {
   std::vector<FixVerdict> validate(const LocalFrame& frame);
 
   /// The oldest of the validated fixes; null where there is none.
-  const SanitizedFix* next() const { return validated_.empty() ? nullptr : &validated_.front(); }
+  const ValidatedFix* next() const { return validated_.empty() ? nullptr : &validated_.front(); }
   /// Takes it out. Requires that there is one.
-  SanitizedFix pop();
+  ValidatedFix pop();
 
   /// Of the fix that was validated last; nothing before the first.
   const std::optional<Stamp>& last_stamp() const { return last_stamp_; }
@@ -31,9 +31,9 @@ class FixQueue {
   void reset() { *this = FixQueue(parameters_); }
 
  private:
-  FixSanitationParameters parameters_;
+  FixValidationParameters parameters_;
   std::deque<RawFix> raw_;
-  std::deque<SanitizedFix> validated_;
+  std::deque<ValidatedFix> validated_;
   std::optional<Stamp> last_stamp_;
 };
 

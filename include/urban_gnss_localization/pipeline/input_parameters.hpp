@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "urban_gnss_localization/common/parameters.hpp"
-#include "urban_gnss_localization/gnss/fix_sanitation.hpp"
+#include "urban_gnss_localization/gnss/fix_validation.hpp"
 #include "urban_gnss_localization/pipeline/input_clocks.hpp"
 
 namespace urban_gnss {
@@ -14,7 +14,7 @@ namespace urban_gnss {
 struct InputParameters {
   std::vector<double> antenna_offset{0.0, 0.0};
   StampParameters stamps;
-  FixSanitationParameters fix_validation;
+  FixValidationParameters fix_validation;
 
   /// m, of the antenna in the base frame.
   Eigen::Vector2d antenna() const { return {antenna_offset[0], antenna_offset[1]}; }

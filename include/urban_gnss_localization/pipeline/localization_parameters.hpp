@@ -39,7 +39,7 @@ struct LocalizationParameters {
     v.group("imu", imu, "the IMU's yaw rate");
     v.group("velocity", velocity, "the receiver's velocity");
     v.group("satellites", satellites, "the satellites of a fix");
-    v.group("bias", bias, "the bias of a fix, where the localizer takes it from a bias filter");
+    v.group("gps_bias", bias, "the bias of a fix, where the localizer takes it from a bias filter");
     v.group("status", status, "when the localizer is said to be well");
   }
 };

@@ -112,10 +112,10 @@ class LocalizationPipeline {
   bool process_next_fix();
   /// Whether satellites or bias of a fix are still to come, and worth waiting for.
   bool awaits_more(Stamp fix) const;
-  void start_with(const SanitizedFix& fix);
-  bool restart_with(const SanitizedFix& fix);
+  void start_with(const ValidatedFix& fix);
+  bool restart_with(const ValidatedFix& fix);
   std::optional<BiasEstimate> take_bias(Stamp fix);
-  void correct_with(const SanitizedFix& fix);
+  void correct_with(const ValidatedFix& fix);
 
   void start_from(const Start& start);
   StartFix with_odometry(const LocalFix& fix) const { return {fix, history_, antenna_}; }
@@ -125,7 +125,7 @@ class LocalizationPipeline {
 
   void decide_stale(FixVerdict verdict, const std::string& reason);
   void decide(FixVerdict verdict);
-  void decide_unexamined(const SanitizedFix& fix, const std::string& reason, bool is_start);
+  void decide_unexamined(const ValidatedFix& fix, const std::string& reason, bool is_start);
   void event(PipelineEvent::Level level, const std::string& text) { events_.push_back({level, text}); }
 
   LocalizationParameters parameters_;

@@ -12,17 +12,16 @@
 namespace urban_gnss {
 
 struct MapConsistencyParameters {
-  double strong_cn0{40.0};        ///< dB-Hz, a signal as strong as that has a line of sight
-  double consistency_time{60.0};  ///< s after which an observation counts 1/e
-  double doubtful_share{0.3};     ///< of the blocked satellites that are received strongly: heading or map is wrong
+  double strong_cn0{40.0};
+  double consistency_time{60.0};
+  double doubtful_share{0.3};
 
-  template <class V>
-  void visit(V& v) {
-    v("strong_cn0", strong_cn0, between(0.0, 70.0));
-    v("consistency_time", consistency_time, positive());
-    v("doubtful_share", doubtful_share, between(0.01, 1.0));
+  void visit(ParameterVisitor& v) {
+    v("strong_cn0", strong_cn0, between(0.0, 70.0), "dB-Hz", "a signal as strong as that has a line of sight");
+    v("consistency_time", consistency_time, positive(), "s", "after which an observation counts 1/e");
+    v("doubtful_share", doubtful_share, between(0.01, 1.0), "",
+      "of the blocked satellites that are received strongly: heading or map is wrong");
   }
-  void check(std::vector<std::string>&) const {}
 };
 
 /// Whether what the map says agrees with what is received. Behind a building a signal is weak or not there at all. With

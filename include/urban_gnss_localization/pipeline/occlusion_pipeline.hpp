@@ -27,26 +27,29 @@ EnumNames<TracerChoice> enum_names(TracerChoice);
 
 struct OcclusionParameters {
   TracerChoice tracer{TracerChoice::kVoxel};
-  std::vector<double> antenna_offset{0.0, 0.0, 0.0};  ///< m, in base_link_frame
-  double antenna_sigma{0.3};       ///< m per horizontal axis: how well the antenna is placed in the map
-  double heading_sigma{0.05};      ///< rad, at least that much is not known of the heading
-  double heading_timeout{5.0};     ///< s, an older heading is not used
-  double satellites_max_age{2.0};  ///< s, older satellites are not used for a fix
-  double map_timeout{60.0};        ///< s without a cloud after which the map is no longer believed
-  int sky_azimuths{72};            ///< directions of the skyline, where there are no satellites and for the sky plot
-  double sky_mask{0.17};           ///< rad, elevation from which the sky counts
+  std::vector<double> antenna_offset{0.0, 0.0, 0.0};
+  double antenna_sigma{0.3};
+  double heading_sigma{0.05};
+  double heading_timeout{5.0};
+  double satellites_max_age{2.0};
+  double map_timeout{60.0};
+  int sky_azimuths{72};
+  double sky_mask{0.17};
 
-  template <class V>
-  void visit(V& v) {
-    v("tracer", tracer);
-    v("antenna_offset", antenna_offset);
-    v("antenna_sigma", antenna_sigma, non_negative());
-    v("heading_sigma", heading_sigma, non_negative());
-    v("heading_timeout", heading_timeout, positive());
-    v("satellites_max_age", satellites_max_age, positive());
-    v("map_timeout", map_timeout, positive());
-    v("sky_azimuths", sky_azimuths, between(8, 720));
-    v("sky_mask", sky_mask, between(0.0, 1.5));
+  void visit(ParameterVisitor& v) {
+    v.basic()("tracer", tracer, "voxel, or kdtree: Algorithm 2 as printed, slow");
+    v.basic()("antenna_offset", antenna_offset, "m",
+              "antenna in base_link_frame; zeros: from tf, by the fix's frame_id");
+    v("antenna_sigma", antenna_sigma, non_negative(), "",
+      "m per horizontal axis: how well the antenna is placed in the map");
+    v("heading_sigma", heading_sigma, non_negative(), "rad", "at least that much is not known of the heading");
+    v("heading_timeout", heading_timeout, positive(), "s", "an older heading is not used");
+    v("satellites_max_age", satellites_max_age, positive(), "s", "older satellites are not used for a fix");
+    v("map_timeout", map_timeout, positive(), "s", "without a cloud after which the map is no longer believed");
+    v("sky_azimuths", sky_azimuths, between(8, 720), "",
+      "directions of the skyline, where there are no satellites and for the sky plot");
+    v("sky_mask", sky_mask, between(0.0, 1.5), "rad",
+      "elevation from which the sky counts where there are no satellites");
   }
   void check(std::vector<std::string>& faults) const;
 };
@@ -62,18 +65,16 @@ struct OcclusionPipelineParameters {
   GnssCovarianceParameters covariance;
   MapConsistencyParameters consistency;
 
-  template <class V>
-  void visit(V& v) {
-    occlusion.visit(v);
-    visibility.visit(v);
-    local_map.visit(v);
-    voxels.visit(v);
-    aligner.visit(v);
-    voxel_tracer.visit(v);
-    covariance.visit(v);
-    consistency.visit(v);
+  void visit(ParameterVisitor& v) {
+    v.include(occlusion);
+    v.group("visibility", visibility, "The rays that are traced to a satellite.");
+    v.group("local_map", local_map, "The map of the surroundings, made of the lidar's clouds.");
+    v.group("voxels", voxels, "Its voxels.");
+    v.group("aligner", aligner, "The alignment of a cloud with the map (ICP).");
+    v.group("voxel_tracer", voxel_tracer, "Where a ray through the voxels is blocked.");
+    v.group("covariance", covariance, "The covariance of a fix, from what is visible.");
+    v.group("consistency", consistency, "Whether map and satellites agree.");
   }
-  void check(std::vector<std::string>& faults) const;
 };
 
 /// How the odometry frame lies in the world, from a localizer or a compass.

@@ -32,11 +32,10 @@ struct Frames {
   std::string odom{"odom"};
   std::string base_link{"base_link"};
 
-  template <class V>
-  void visit(V& v) {
-    v("map_frame", map);
-    v("odom_frame", odom);
-    v("base_link_frame", base_link);
+  void visit(ParameterVisitor& v) {
+    v.basic()("map_frame", map, "fixed to the world: x east, y north of the datum");
+    v.basic()("odom_frame", odom, "the frame of the odometry's pose");
+    v.basic()("base_link_frame", base_link, "the robot; Nishida et al. put it on the rear axle");
   }
   void check(std::vector<std::string>& faults) const;
 };

@@ -32,21 +32,18 @@ namespace urban_gnss {
 struct LocalizerNodeParameters {
   Frames frames;
   bool publish_tf{true};
-  double transform_time_offset{0.0};  ///< s, added to the stamp of map -> odom
-  bool antenna_offset_from_tf{true};  ///< antenna_offset from base_link_frame -> the fix's frame_id, where tf has it
+  double transform_time_offset{0.0};
+  bool antenna_offset_from_tf{true};
   LocalizationParameters localization;
 
-  template <class V>
-  void visit(V& v) {
-    frames.visit(v);
-    v("publish_tf", publish_tf);
-    v("transform_time_offset", transform_time_offset, any_number());
-    v("antenna_offset_from_tf", antenna_offset_from_tf);
-    localization.visit(v);
-  }
-  void check(std::vector<std::string>& faults) const {
-    frames.check(faults);
-    localization.check(faults);
+  void visit(ParameterVisitor& v) {
+    v.include(frames);
+    v.basic()("publish_tf", publish_tf, "broadcast map -> odom; false where another localizer does");
+    v("transform_time_offset", transform_time_offset, any_number(), "s",
+      "added to the stamp of map -> odom, so that users need not wait for the next");
+    v("antenna_offset_from_tf", antenna_offset_from_tf,
+      "take antenna_offset from tf (base_link -> the fix's frame_id) where it is [0, 0]");
+    v.include(localization);
   }
 };
 

@@ -5,7 +5,7 @@
 
 #include <functional>
 
-#include "urban_gnss_localization/common/parameters.hpp"
+#include "urban_gnss_localization/parameters/parameter_reader.hpp"
 
 namespace urban_gnss {
 

@@ -23,23 +23,25 @@ namespace urban_gnss {
 
 /// What the node is told beside OcclusionPipelineParameters and Frames; config/occlusion.yaml documents each.
 struct OcclusionNodeParameters {
-  std::string prior_map{""};       ///< .pcd file, in the axes of the world about the map frame's origin
-  double tf_timeout{0.5};          ///< s of stamps that a cloud or a fix waits for its transform
-  int cloud_queue{5};              ///< clouds that wait at most; more are dropped, the oldest first
-  double time_jump{1.0};           ///< s, a fix older than the last by more is a clock that was set back
-  double map_publish_period{1.0};  ///< s between publications of the map, where somebody listens
-  int sky_plot_size{480};          ///< pixels
+  std::string prior_map{""};
+  double tf_timeout{0.5};
+  int cloud_queue{5};
+  double time_jump{1.0};
+  double map_publish_period{1.0};
+  int sky_plot_size{480};
 
-  template <class V>
-  void visit(V& v) {
-    v("prior_map", prior_map);
-    v("tf_timeout", tf_timeout, non_negative());
-    v("cloud_queue", cloud_queue, between(1, 1000));
-    v("time_jump", time_jump, positive());
-    v("map_publish_period", map_publish_period, positive());
-    v("sky_plot_size", sky_plot_size, between(50, 4000));
+  void visit(ParameterVisitor& v) {
+    v.basic()("prior_map", prior_map,
+      ".pcd file, m east, north and up of map_frame's origin; ~clear_map leaves it; empty: none");
+    v("tf_timeout", tf_timeout, non_negative(), "s",
+      "of the fixes' stamps that a cloud or a fix waits for its transform");
+    v("cloud_queue", cloud_queue, between(1, 1000), "", "clouds that wait at most; beyond that the oldest is dropped");
+    v("time_jump", time_jump, positive(), "s",
+      "a stamp older than the last by more than this is a clock that was set back");
+    v("map_publish_period", map_publish_period, positive(), "",
+      "s between publications of the map, where somebody listens");
+    v("sky_plot_size", sky_plot_size, between(50, 4000), "", "pixels, width and height of gps/sky_plot");
   }
-  void check(std::vector<std::string>&) const {}
 };
 
 /// Weighs fixes by what stands between the antenna and the satellites (Maier & Kleiner 2010): points, gps/satellites,

@@ -71,17 +71,17 @@ struct SkyParameters {
   bool gps{true};
   bool galileo{true};
   bool glonass{false};
-  /// YUMA almanac file that replaces the GPS baseline constellation; empty for none. Relative to the scenario's folder.
   std::string almanac;
-  double elevation_mask{0.0873};  ///< rad
+  double elevation_mask{0.0873};
 
-  template <class V>
-  void visit(V& v) {
-    v("gps", gps);
-    v("galileo", galileo);
-    v("glonass", glonass);
-    v("almanac", almanac);
-    v("elevation_mask", elevation_mask, between(0.0, 1.5));
+  void visit(ParameterVisitor& v) {
+    v("gps", gps, "");
+    v("galileo", galileo, "");
+    v("glonass", glonass, "");
+    v("almanac", almanac,
+      "YUMA almanac file that replaces the GPS baseline constellation; empty for none. Relative to the scenario's "
+      "folder");
+    v("elevation_mask", elevation_mask, between(0.0, 1.5), "", "rad");
   }
   void check(std::vector<std::string>& faults) const;
 };

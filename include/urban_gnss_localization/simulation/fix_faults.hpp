@@ -25,22 +25,21 @@ EnumNames<FixFaultType> enum_names(FixFaultType);
 /// A fault at a scripted time: active at start <= t < start + duration.
 struct FixFault {
   FixFaultType type{FixFaultType::kSpike};
-  double start{0.0};                          ///< s since the start of the simulation
-  double duration{1.0};                       ///< s
-  double share{1.0};                          ///< of the fixes in that time that are hit, drawn at random (spike, nan)
-  std::vector<double> offset{0.0, 0.0, 0.0};  ///< m, east, north, up (spike, decoy, duplicate)
-  std::vector<double> rate{0.0, 0.0, 0.0};    ///< m/s, east, north, up (ramp)
-  double sigma{0.5};                          ///< m per axis (decoy)
+  double start{0.0};
+  double duration{1.0};
+  double share{1.0};
+  std::vector<double> offset{0.0, 0.0, 0.0};
+  std::vector<double> rate{0.0, 0.0, 0.0};
+  double sigma{0.5};
 
-  template <class V>
-  void visit(V& v) {
-    v("type", type);
-    v("start", start, non_negative());
-    v("duration", duration, positive());
-    v("share", share, between(0.0, 1.0));
-    v("offset", offset);
-    v("rate", rate);
-    v("sigma", sigma, non_negative());
+  void visit(ParameterVisitor& v) {
+    v("type", type, "");
+    v("start", start, non_negative(), "", "s since the start of the simulation");
+    v("duration", duration, positive(), "", "s");
+    v("share", share, between(0.0, 1.0), "", "of the fixes in that time that are hit, drawn at random (spike, nan)");
+    v("offset", offset, "m", "east, north, up (spike, decoy, duplicate)");
+    v("rate", rate, "m/s", "east, north, up (ramp)");
+    v("sigma", sigma, non_negative(), "", "m per axis (decoy)");
   }
   void check(std::vector<std::string>& faults) const;
 };

@@ -17,25 +17,23 @@ constexpr double kGravity_mps2 = 9.80665;
 
 /// A MEMS unit of the middle class after start-up calibration.
 struct ImuParameters {
-  double rate{100.0};                       ///< Hz
-  double gyro_noise_density{2e-4};          ///< rad/s/sqrt(Hz)
-  double gyro_bias_sigma{0.002};            ///< rad/s, of each axis's bias at the start
-  double gyro_bias_walk{2e-5};              ///< rad/s/sqrt(s)
-  double acceleration_noise_density{2e-3};  ///< m/s^2/sqrt(Hz)
-  double acceleration_bias_sigma{0.05};     ///< m/s^2, of each axis's bias at the start
-  double acceleration_bias_walk{2e-4};      ///< m/s^2/sqrt(s)
+  double rate{100.0};
+  double gyro_noise_density{2e-4};
+  double gyro_bias_sigma{0.002};
+  double gyro_bias_walk{2e-5};
+  double acceleration_noise_density{2e-3};
+  double acceleration_bias_sigma{0.05};
+  double acceleration_bias_walk{2e-4};
 
-  template <class V>
-  void visit(V& v) {
-    v("rate", rate, between(1.0, 1000.0));
-    v("gyro_noise_density", gyro_noise_density, non_negative());
-    v("gyro_bias_sigma", gyro_bias_sigma, non_negative());
-    v("gyro_bias_walk", gyro_bias_walk, non_negative());
-    v("acceleration_noise_density", acceleration_noise_density, non_negative());
-    v("acceleration_bias_sigma", acceleration_bias_sigma, non_negative());
-    v("acceleration_bias_walk", acceleration_bias_walk, non_negative());
+  void visit(ParameterVisitor& v) {
+    v("rate", rate, between(1.0, 1000.0), "", "Hz");
+    v("gyro_noise_density", gyro_noise_density, non_negative(), "", "rad/s/sqrt(Hz)");
+    v("gyro_bias_sigma", gyro_bias_sigma, non_negative(), "rad/s", "of each axis's bias at the start");
+    v("gyro_bias_walk", gyro_bias_walk, non_negative(), "", "rad/s/sqrt(s)");
+    v("acceleration_noise_density", acceleration_noise_density, non_negative(), "", "m/s^2/sqrt(Hz)");
+    v("acceleration_bias_sigma", acceleration_bias_sigma, non_negative(), "m/s^2", "of each axis's bias at the start");
+    v("acceleration_bias_walk", acceleration_bias_walk, non_negative(), "", "m/s^2/sqrt(s)");
   }
-  void check(std::vector<std::string>&) const {}
 };
 
 /// Axes of base_link (x forward, y left, z up). The unit gives no orientation.

@@ -33,54 +33,57 @@ EnumNames<LidarAxis> enum_names(LidarAxis);
 
 struct LidarParameters {
   LidarType type{LidarType::kSpinning};
-  double rate{10.0};                              ///< Hz, revolutions, for spinning
-  int beams{16};                                  ///< for spinning
-  double vertical_fov_low{-0.26};                 ///< rad, elevation of the lowest beam, for spinning
-  double vertical_fov_high{0.26};                 ///< rad, elevation of the highest beam, for spinning
-  int points_per_revolution{1875};                ///< of each beam, for spinning
-  LidarAxis rotation_axis{LidarAxis::kVertical};  ///< for rotating_2d
-  double sweep_time{2.0};                         ///< s, of a half turn, for rotating_2d; Maier & Kleiner turn 90 deg/s
-  double line_rate{75.0};                         ///< Hz, fans, for rotating_2d; SICK LMS 200 at 1 degree
-  int rays_per_line{181};                         ///< over 180 degrees, both ends included, for rotating_2d
-  double range_min{0.5};                          ///< m, nearer surfaces give no point
-  double range_max{80.0};                         ///< m
-  double range_sigma{0.02};                       ///< m
-  double dropout{0.02};                           ///< share of returns that are lost
-  double crown_return_share{0.3};  ///< of the rays that travel a metre through a tree's crown, how many end there
-  double mount_x{1.0};             ///< m, sensor in base_link, axes parallel
+  double rate{10.0};
+  int beams{16};
+  double vertical_fov_low{-0.26};
+  double vertical_fov_high{0.26};
+  int points_per_revolution{1875};
+  LidarAxis rotation_axis{LidarAxis::kVertical};
+  double sweep_time{2.0};
+  double line_rate{75.0};
+  int rays_per_line{181};
+  double range_min{0.5};
+  double range_max{80.0};
+  double range_sigma{0.02};
+  double dropout{0.02};
+  double crown_return_share{0.3};
+  double mount_x{1.0};
   double mount_y{0.0};
   double mount_z{1.9};
-  double body_rear{-0.8};  ///< m, box of the robot's body in base_link: x from body_rear to body_front
+  double body_rear{-0.8};
   double body_front{3.2};
-  double body_width{1.7};   ///< m, about y = 0; 0: no body
-  double body_bottom{0.2};  ///< m
-  double body_top{1.5};     ///< m
+  double body_width{1.7};
+  double body_bottom{0.2};
+  double body_top{1.5};
 
-  template <class V>
-  void visit(V& v) {
-    v("type", type);
-    v("rate", rate, between(0.1, 100.0));
-    v("beams", beams, between(1, 256));
-    v("vertical_fov_low", vertical_fov_low, between(-1.57, 1.57));
-    v("vertical_fov_high", vertical_fov_high, between(-1.57, 1.57));
-    v("points_per_revolution", points_per_revolution, between(1, 100000));
-    v("rotation_axis", rotation_axis);
-    v("sweep_time", sweep_time, between(0.01, 60.0));
-    v("line_rate", line_rate, between(1.0, 10000.0));
-    v("rays_per_line", rays_per_line, between(2, 10000));
-    v("range_min", range_min, non_negative());
-    v("range_max", range_max, positive());
-    v("range_sigma", range_sigma, non_negative());
-    v("dropout", dropout, between(0.0, 1.0));
-    v("crown_return_share", crown_return_share, between(0.0, 1.0));
-    v("mount_x", mount_x, any_number());
-    v("mount_y", mount_y, any_number());
-    v("mount_z", mount_z, positive());
-    v("body_rear", body_rear, any_number());
-    v("body_front", body_front, any_number());
-    v("body_width", body_width, non_negative());
-    v("body_bottom", body_bottom, non_negative());
-    v("body_top", body_top, non_negative());
+  void visit(ParameterVisitor& v) {
+    v("type", type, "");
+    v("rate", rate, between(0.1, 100.0), "Hz", "revolutions, for spinning");
+    v("beams", beams, between(1, 256), "", "for spinning");
+    v("vertical_fov_low", vertical_fov_low, between(-1.57, 1.57), "rad", "elevation of the lowest beam, for spinning");
+    v("vertical_fov_high", vertical_fov_high, between(-1.57, 1.57), "rad",
+      "elevation of the highest beam, for spinning");
+    v("points_per_revolution", points_per_revolution, between(1, 100000), "", "of each beam, for spinning");
+    v("rotation_axis", rotation_axis, "for rotating_2d");
+    v("sweep_time", sweep_time, between(0.01, 60.0), "s",
+      "of a half turn, for rotating_2d; Maier & Kleiner turn 90 deg/s");
+    v("line_rate", line_rate, between(1.0, 10000.0), "Hz", "fans, for rotating_2d; SICK LMS 200 at 1 degree");
+    v("rays_per_line", rays_per_line, between(2, 10000), "", "over 180 degrees, both ends included, for rotating_2d");
+    v("range_min", range_min, non_negative(), "m", "nearer surfaces give no point");
+    v("range_max", range_max, positive(), "", "m");
+    v("range_sigma", range_sigma, non_negative(), "", "m");
+    v("dropout", dropout, between(0.0, 1.0), "", "share of returns that are lost");
+    v("crown_return_share", crown_return_share, between(0.0, 1.0), "",
+      "of the rays that travel a metre through a tree's crown, how many end there");
+    v("mount_x", mount_x, any_number(), "m", "sensor in base_link, axes parallel");
+    v("mount_y", mount_y, any_number(), "", "");
+    v("mount_z", mount_z, positive(), "", "");
+    v("body_rear", body_rear, any_number(), "m",
+      "box of the robot's body in base_link: x from body_rear to body_front");
+    v("body_front", body_front, any_number(), "", "");
+    v("body_width", body_width, non_negative(), "m", "about y = 0; 0: no body");
+    v("body_bottom", body_bottom, non_negative(), "", "m");
+    v("body_top", body_top, non_negative(), "", "m");
   }
   /// The ranges and fields of view in order, at least one line a sweep, the sensor outside the body.
   void check(std::vector<std::string>& faults) const;

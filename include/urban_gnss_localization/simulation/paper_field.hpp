@@ -20,32 +20,31 @@ EnumNames<BiasDirection> enum_names(BiasDirection);
 /// The field of Nishida et al., section 4.1.
 struct PaperFieldParameters {
   int target_count{8};
-  double target_ring_radius{15.0};               ///< m; the figure with the coordinates is lost
-  double interval{0.01};                         ///< s, Delta: one motion step and one fix
-  double shadow_border{0.0};                     ///< m, the shadow is where x is less
-  double fix_direct_sigma{0.05};                 ///< m, sigma_b
-  double fix_shadow_sigma{0.31622776601683794};  ///< m, sigma_s
-  double bias_limit{5.0};                        ///< m, eq. (44)
+  double target_ring_radius{15.0};
+  double interval{0.01};
+  double shadow_border{0.0};
+  double fix_direct_sigma{0.05};
+  double fix_shadow_sigma{0.31622776601683794};
+  double bias_limit{5.0};
   BiasDirection bias_direction{BiasDirection::kRandom};
-  double start_position_sigma{0.05};  ///< m, of what a localizer is told about the start
-  double start_heading_sigma{0.05};   ///< rad
+  double start_position_sigma{0.05};
+  double start_heading_sigma{0.05};
   int seed{1};
 
-  template <class V>
-  void visit(V& v) {
-    v("target_count", target_count, at_least(2));
-    v("target_ring_radius", target_ring_radius, positive());
-    v("interval", interval, positive());
-    v("shadow_border", shadow_border, any_number());
-    v("fix_direct_sigma", fix_direct_sigma, non_negative());
-    v("fix_shadow_sigma", fix_shadow_sigma, non_negative());
-    v("bias_limit", bias_limit, non_negative());
-    v("bias_direction", bias_direction);
-    v("start_position_sigma", start_position_sigma, non_negative());
-    v("start_heading_sigma", start_heading_sigma, non_negative());
-    v("seed", seed, any_number());
+  void visit(ParameterVisitor& v) {
+    v("target_count", target_count, at_least(2), "", "targets on a ring");
+    v("target_ring_radius", target_ring_radius, positive(), "m", "of that ring; the figure with the coordinates is lost");
+    v("interval", interval, positive(), "s", "Delta: one motion step and one fix");
+    v("shadow_border", shadow_border, any_number(), "m", "the shadow is where x is less");
+    v("fix_direct_sigma", fix_direct_sigma, non_negative(), "m", "sigma_b");
+    v("fix_shadow_sigma", fix_shadow_sigma, non_negative(), "m", "sigma_s");
+    v("bias_limit", bias_limit, non_negative(), "m", "eq. (44)");
+    v.basic()("bias_direction", bias_direction, "of the bias in the shadow: random anew at each entry, or along -x");
+    v("start_position_sigma", start_position_sigma, non_negative(), "m",
+      "of what a localizer is told about the start");
+    v("start_heading_sigma", start_heading_sigma, non_negative(), "rad", "likewise");
+    v.basic()("seed", seed, any_number(), "", "of all that is random");
   }
-  void check(std::vector<std::string>&) const {}
 
   /// x and y of each target in turn, m, counter-clockwise from (target_ring_radius, 0).
   std::vector<double> targets() const;

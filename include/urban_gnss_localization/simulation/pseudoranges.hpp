@@ -21,35 +21,36 @@ EnumNames<PathClass> enum_names(PathClass);
 
 /// How a receiver follows one satellite and what its pseudorange is worth.
 struct ChannelParameters {
-  double cn0_horizon{38.0};            ///< dB-Hz, free signal at elevation 0: satellite, antenna, front end
-  double cn0_zenith{47.0};             ///< dB-Hz
-  double cn0_offset_sigma{1.5};        ///< dB, between satellites
-  double cn0_noise_sigma{1.0};         ///< dB, slow changes of one satellite
-  double cn0_noise_time{10.0};         ///< s, their correlation time
-  double tracking_threshold{17.0};     ///< dB-Hz, a tracked signal is lost below
-  double acquisition_threshold{20.0};  ///< dB-Hz, a signal is found above
-  double acquisition_time{1.0};        ///< s that a signal must be there before it is tracked
-  double correlator_spacing{0.5};      ///< chips
-  double code_bandwidth{0.5};          ///< Hz, noise bandwidth of the code loop, aided by the carrier
-  double integration_time{0.02};       ///< s
-  double atmosphere_sigma{0.6};        ///< m at the zenith: residual ionosphere, troposphere, orbit and clock
-  double atmosphere_time{600.0};       ///< s, its correlation time
+  double cn0_horizon{38.0};
+  double cn0_zenith{47.0};
+  double cn0_offset_sigma{1.5};
+  double cn0_noise_sigma{1.0};
+  double cn0_noise_time{10.0};
+  double tracking_threshold{17.0};
+  double acquisition_threshold{20.0};
+  double acquisition_time{1.0};
+  double correlator_spacing{0.5};
+  double code_bandwidth{0.5};
+  double integration_time{0.02};
+  double atmosphere_sigma{0.6};
+  double atmosphere_time{600.0};
 
-  template <class V>
-  void visit(V& v) {
-    v("cn0_horizon", cn0_horizon, between(0.0, 70.0));
-    v("cn0_zenith", cn0_zenith, between(0.0, 70.0));
-    v("cn0_offset_sigma", cn0_offset_sigma, non_negative());
-    v("cn0_noise_sigma", cn0_noise_sigma, non_negative());
-    v("cn0_noise_time", cn0_noise_time, positive());
-    v("tracking_threshold", tracking_threshold, between(0.0, 70.0));
-    v("acquisition_threshold", acquisition_threshold, between(0.0, 70.0));
-    v("acquisition_time", acquisition_time, non_negative());
-    v("correlator_spacing", correlator_spacing, Range{0.0, 1.0, true});
-    v("code_bandwidth", code_bandwidth, positive());
-    v("integration_time", integration_time, positive());
-    v("atmosphere_sigma", atmosphere_sigma, non_negative());
-    v("atmosphere_time", atmosphere_time, positive());
+  void visit(ParameterVisitor& v) {
+    v("cn0_horizon", cn0_horizon, between(0.0, 70.0), "dB-Hz",
+      "free signal at elevation 0: satellite, antenna, front end");
+    v("cn0_zenith", cn0_zenith, between(0.0, 70.0), "", "dB-Hz");
+    v("cn0_offset_sigma", cn0_offset_sigma, non_negative(), "dB", "between satellites");
+    v("cn0_noise_sigma", cn0_noise_sigma, non_negative(), "dB", "slow changes of one satellite");
+    v("cn0_noise_time", cn0_noise_time, positive(), "s", "their correlation time");
+    v("tracking_threshold", tracking_threshold, between(0.0, 70.0), "dB-Hz", "a tracked signal is lost below");
+    v("acquisition_threshold", acquisition_threshold, between(0.0, 70.0), "dB-Hz", "a signal is found above");
+    v("acquisition_time", acquisition_time, non_negative(), "s", "that a signal must be there before it is tracked");
+    v("correlator_spacing", correlator_spacing, open_between(0.0, 1.0), "", "chips");
+    v("code_bandwidth", code_bandwidth, positive(), "Hz", "noise bandwidth of the code loop, aided by the carrier");
+    v("integration_time", integration_time, positive(), "", "s");
+    v("atmosphere_sigma", atmosphere_sigma, non_negative(), "",
+      "m at the zenith: residual ionosphere, troposphere, orbit and clock");
+    v("atmosphere_time", atmosphere_time, positive(), "s", "its correlation time");
   }
   void check(std::vector<std::string>& faults) const;
 };

@@ -16,39 +16,42 @@ namespace urban_gnss {
 
 /// A consumer receiver: how it follows satellites, solves, smooths, and what it claims.
 struct ReceiverParameters {
-  double rate{5.0};  ///< Hz, of epochs; for the caller, who passes the interval
+  double rate{5.0};
   ChannelParameters channel;
-  double clock_walk{0.5};                ///< m/sqrt(s), of each constellation's clock
-  double elevation_mask{0.0873};         ///< rad, satellites below are not used
-  double sigma_cn0{40.0};                ///< dB-Hz at which the receiver believes in uere for one range
-  double altitude_prior_sigma{30.0};     ///< m, about the receiver's own last height; 0 turns the belief off
-  double max_hdop{20.0};                 ///< no fix beyond
-  double smoothing_time{8.0};            ///< s, of the filter over the solutions; 0 turns it off
-  double coasting_time{3.0};             ///< s without a solution after which that filter starts anew
-  double velocity_sigma{0.05};           ///< m/s per axis, of a Doppler solution with HDOP 1 and free signals
-  double velocity_nlos_sigma{0.5};       ///< m/s per axis, added by the share of satellites without line of sight
-  double uere{3.0};                      ///< m, that the claimed covariance takes for every satellite
-  double angle_resolution{kPi / 180.0};  ///< rad, reported azimuth and elevation are rounded to it; 0 = not rounded
-  double latency_min{0.05};              ///< s, from the epoch to the publication
-  double latency_max{0.2};               ///< s
+  double clock_walk{0.5};
+  double elevation_mask{0.0873};
+  double sigma_cn0{40.0};
+  double altitude_prior_sigma{30.0};
+  double max_hdop{20.0};
+  double smoothing_time{8.0};
+  double coasting_time{3.0};
+  double velocity_sigma{0.05};
+  double velocity_nlos_sigma{0.5};
+  double uere{3.0};
+  double angle_resolution{kPi / 180.0};
+  double latency_min{0.05};
+  double latency_max{0.2};
 
-  template <class V>
-  void visit(V& v) {
-    v("rate", rate, between(0.1, 50.0));
-    channel.visit(v);
-    v("clock_walk", clock_walk, non_negative());
-    v("elevation_mask", elevation_mask, between(-kPi / 2.0, kPi / 2.0));
-    v("sigma_cn0", sigma_cn0, between(0.0, 70.0));
-    v("altitude_prior_sigma", altitude_prior_sigma, non_negative());
-    v("max_hdop", max_hdop, positive());
-    v("smoothing_time", smoothing_time, non_negative());
-    v("coasting_time", coasting_time, non_negative());
-    v("velocity_sigma", velocity_sigma, non_negative());
-    v("velocity_nlos_sigma", velocity_nlos_sigma, non_negative());
-    v("uere", uere, positive());
-    v("angle_resolution", angle_resolution, between(0.0, 0.2));
-    v("latency_min", latency_min, non_negative());
-    v("latency_max", latency_max, non_negative());
+  void visit(ParameterVisitor& v) {
+    v("rate", rate, between(0.1, 50.0), "Hz", "of epochs; for the caller, who passes the interval");
+    v.include(channel);
+    v("clock_walk", clock_walk, non_negative(), "m/sqrt(s)", "of each constellation's clock");
+    v("elevation_mask", elevation_mask, between(-kPi / 2.0, kPi / 2.0), "rad", "satellites below are not used");
+    v("sigma_cn0", sigma_cn0, between(0.0, 70.0), "", "dB-Hz at which the receiver believes in uere for one range");
+    v("altitude_prior_sigma", altitude_prior_sigma, non_negative(), "m",
+      "about the receiver's own last height; 0 turns the belief off");
+    v("max_hdop", max_hdop, positive(), "", "no fix beyond");
+    v("smoothing_time", smoothing_time, non_negative(), "s", "of the filter over the solutions; 0 turns it off");
+    v("coasting_time", coasting_time, non_negative(), "s", "without a solution after which that filter starts anew");
+    v("velocity_sigma", velocity_sigma, non_negative(), "m/s per axis",
+      "of a Doppler solution with HDOP 1 and free signals");
+    v("velocity_nlos_sigma", velocity_nlos_sigma, non_negative(), "m/s per axis",
+      "added by the share of satellites without line of sight");
+    v("uere", uere, positive(), "m", "that the claimed covariance takes for every satellite");
+    v("angle_resolution", angle_resolution, between(0.0, 0.2), "rad",
+      "reported azimuth and elevation are rounded to it; 0 = not rounded");
+    v("latency_min", latency_min, non_negative(), "s", "from the epoch to the publication");
+    v("latency_max", latency_max, non_negative(), "", "s");
   }
   void check(std::vector<std::string>& faults) const;
 };

@@ -52,25 +52,23 @@ Route resample_track(const std::vector<double>& stamps_s, const std::vector<Eige
 Route read_track(const std::string& path, const TrackResampling& resampling = {});
 
 struct RouteFollowerParameters {
-  double corner_radius{6.0};             ///< m, to which corners are rounded; shorter legs allow less
-  double max_lateral_acceleration{2.0};  ///< m/s^2, slows in curves
-  double acceleration{1.5};              ///< m/s^2, of the speed profile
-  double deceleration{1.5};              ///< m/s^2, of the speed profile
-  double lookahead_time{0.5};            ///< s
-  double min_lookahead{2.0};             ///< m
-  double crawl_speed{0.5};               ///< m/s, the least while under way
+  double corner_radius{6.0};
+  double max_lateral_acceleration{2.0};
+  double acceleration{1.5};
+  double deceleration{1.5};
+  double lookahead_time{0.5};
+  double min_lookahead{2.0};
+  double crawl_speed{0.5};
 
-  template <class V>
-  void visit(V& v) {
-    v("corner_radius", corner_radius, positive());
-    v("max_lateral_acceleration", max_lateral_acceleration, positive());
-    v("acceleration", acceleration, positive());
-    v("deceleration", deceleration, positive());
-    v("lookahead_time", lookahead_time, positive());
-    v("min_lookahead", min_lookahead, positive());
-    v("crawl_speed", crawl_speed, positive());
+  void visit(ParameterVisitor& v) {
+    v("corner_radius", corner_radius, positive(), "m", "to which corners are rounded; shorter legs allow less");
+    v("max_lateral_acceleration", max_lateral_acceleration, positive(), "m/s^2", "slows in curves");
+    v("acceleration", acceleration, positive(), "m/s^2", "of the speed profile");
+    v("deceleration", deceleration, positive(), "m/s^2", "of the speed profile");
+    v("lookahead_time", lookahead_time, positive(), "", "s");
+    v("min_lookahead", min_lookahead, positive(), "", "m");
+    v("crawl_speed", crawl_speed, positive(), "m/s", "the least while under way");
   }
-  void check(std::vector<std::string>&) const {}
 };
 
 /// An autopilot on the TRUE pose: pure pursuit (Coulter, "Implementation of the Pure Pursuit Path Tracking Algorithm",

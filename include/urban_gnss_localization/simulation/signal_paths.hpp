@@ -15,25 +15,27 @@ inline constexpr int kMaxReflections = 6;
 
 /// How a satellite's signal gets to an antenna among buildings.
 struct SignalParameters {
-  double reflection_range{120.0};  ///< m, horizontal: reflections farther from the antenna are not sought
-  int max_reflections{6};          ///< longest chain of walls; 0 turns reflections off
-  /// The lengths of chains sought are limited to those for which the walls near the antenna mirror the line of sight
-  /// into at most so many directions: a grid city has 4 whatever the length, k directions of walls have about k^length.
+  double reflection_range{120.0};
+  int max_reflections{6};
   int max_directions{128};
-  double polarisation_loss{6.0};  ///< dB, of an odd number of reflections at an antenna made for the right-handed wave
-  double trunk_loss{10.0};        ///< dB
-  double max_loss{24.0};          ///< dB, weaker paths are left out
+  double polarisation_loss{6.0};
+  double trunk_loss{10.0};
+  double max_loss{24.0};
 
-  template <class V>
-  void visit(V& v) {
-    v("reflection_range", reflection_range, positive());
-    v("max_reflections", max_reflections, between(0, kMaxReflections));
-    v("max_directions", max_directions, at_least(1));
-    v("polarisation_loss", polarisation_loss, non_negative());
-    v("trunk_loss", trunk_loss, non_negative());
-    v("max_loss", max_loss, positive());
+  void visit(ParameterVisitor& v) {
+    v("reflection_range", reflection_range, positive(), "m",
+      "horizontal: reflections farther from the antenna are not sought");
+    v("max_reflections", max_reflections, between(0, kMaxReflections), "",
+      "longest chain of walls; 0 turns reflections off");
+    v("max_directions", max_directions, at_least(1), "",
+      "The lengths of chains sought are limited to those for which the walls near the antenna mirror the line of sight "
+      "into at most so many directions: a grid city has 4 whatever the length, k directions of walls have about "
+      "k^length");
+    v("polarisation_loss", polarisation_loss, non_negative(), "dB",
+      "of an odd number of reflections at an antenna made for the right-handed wave");
+    v("trunk_loss", trunk_loss, non_negative(), "", "dB");
+    v("max_loss", max_loss, positive(), "dB", "weaker paths are left out");
   }
-  void check(std::vector<std::string>&) const {}
 };
 
 /// A path by specular reflection at one or more walls.

@@ -21,51 +21,49 @@ EnumNames<Drive> enum_names(Drive);
 /// A road robot of the size of a small car.
 struct VehicleParameters {
   Drive drive{Drive::kBicycle};
-  double wheelbase{2.5};             ///< m, for bicycle
-  double max_speed{20.0};            ///< m/s, forwards and backwards
-  double max_acceleration{2.0};      ///< m/s^2
-  double max_deceleration{4.0};      ///< m/s^2
-  double max_steering{0.6};          ///< rad, for bicycle
-  double max_steering_rate{0.8};     ///< rad/s, for bicycle
-  double max_yaw_rate{1.5};          ///< rad/s, for differential
-  double max_yaw_acceleration{3.0};  ///< rad/s^2, for differential
-  /// The actuation noise of Nishida et al., eq. (5)-(7), with the meaning that MotionParameters gives its
-  /// odom_alpha1..6; on speed and steering angle for bicycle, on speed and yaw rate for differential.
+  double wheelbase{2.5};
+  double max_speed{20.0};
+  double max_acceleration{2.0};
+  double max_deceleration{4.0};
+  double max_steering{0.6};
+  double max_steering_rate{0.8};
+  double max_yaw_rate{1.5};
+  double max_yaw_acceleration{3.0};
   double actuation_alpha1{1e-6};
   double actuation_alpha2{1e-6};
   double actuation_alpha3{2.5e-9};
   double actuation_alpha4{1e-6};
   double actuation_alpha5{1e-8};
   double actuation_alpha6{1e-6};
-  double actuation_noise_interval{1.0};  ///< s
-  /// m, GNSS antenna in base_link, which lies on the ground below the rear (bicycle) or only (differential) axle
+  double actuation_noise_interval{1.0};
   double antenna_x{1.0};
   double antenna_y{0.0};
   double antenna_z{1.8};
 
-  template <class V>
-  void visit(V& v) {
-    v("drive", drive);
-    v("wheelbase", wheelbase, positive());
-    v("max_speed", max_speed, positive());
-    v("max_acceleration", max_acceleration, positive());
-    v("max_deceleration", max_deceleration, positive());
-    v("max_steering", max_steering, between(0.01, 1.5));
-    v("max_steering_rate", max_steering_rate, positive());
-    v("max_yaw_rate", max_yaw_rate, positive());
-    v("max_yaw_acceleration", max_yaw_acceleration, positive());
-    v("actuation_alpha1", actuation_alpha1, non_negative());
-    v("actuation_alpha2", actuation_alpha2, non_negative());
-    v("actuation_alpha3", actuation_alpha3, non_negative());
-    v("actuation_alpha4", actuation_alpha4, non_negative());
-    v("actuation_alpha5", actuation_alpha5, non_negative());
-    v("actuation_alpha6", actuation_alpha6, non_negative());
-    v("actuation_noise_interval", actuation_noise_interval, positive());
-    v("antenna_x", antenna_x, any_number());
-    v("antenna_y", antenna_y, any_number());
-    v("antenna_z", antenna_z, non_negative());
+  void visit(ParameterVisitor& v) {
+    v("drive", drive, "");
+    v("wheelbase", wheelbase, positive(), "m", "for bicycle");
+    v("max_speed", max_speed, positive(), "m/s", "forwards and backwards");
+    v("max_acceleration", max_acceleration, positive(), "", "m/s^2");
+    v("max_deceleration", max_deceleration, positive(), "", "m/s^2");
+    v("max_steering", max_steering, between(0.01, 1.5), "rad", "for bicycle");
+    v("max_steering_rate", max_steering_rate, positive(), "rad/s", "for bicycle");
+    v("max_yaw_rate", max_yaw_rate, positive(), "rad/s", "for differential");
+    v("max_yaw_acceleration", max_yaw_acceleration, positive(), "", "rad/s^2, for differential");
+    v("actuation_alpha1", actuation_alpha1, non_negative(), "",
+      "The actuation noise of Nishida et al., eq. (5)-(7), with the meaning that MotionParameters gives its "
+      "odom_alpha1..6; on speed and steering angle for bicycle, on speed and yaw rate for differential");
+    v("actuation_alpha2", actuation_alpha2, non_negative(), "", "");
+    v("actuation_alpha3", actuation_alpha3, non_negative(), "", "");
+    v("actuation_alpha4", actuation_alpha4, non_negative(), "", "");
+    v("actuation_alpha5", actuation_alpha5, non_negative(), "", "");
+    v("actuation_alpha6", actuation_alpha6, non_negative(), "", "");
+    v("actuation_noise_interval", actuation_noise_interval, positive(), "", "s");
+    v("antenna_x", antenna_x, any_number(), "m",
+      "GNSS antenna in base_link, which lies on the ground below the rear (bicycle) or only (differential) axle");
+    v("antenna_y", antenna_y, any_number(), "", "");
+    v("antenna_z", antenna_z, non_negative(), "", "");
   }
-  void check(std::vector<std::string>&) const {}
 
   Eigen::Vector3d antenna() const { return {antenna_x, antenna_y, antenna_z}; }
   /// The noise parameters in the form in which the motion model takes them.

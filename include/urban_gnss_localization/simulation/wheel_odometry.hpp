@@ -16,37 +16,36 @@ namespace urban_gnss {
 
 /// Errors of the size seen in recordings: speed scale 0.3-2.5 %, yaw-rate bias 0.001-0.006 rad/s.
 struct WheelOdometryParameters {
-  double rate{50.0};                    ///< Hz
-  double speed_scale_sigma{0.01};       ///< of the factor on the speed, drawn once a run
-  double yaw_rate_scale_sigma{0.01};    ///< of the factor on the yaw rate, drawn once a run
-  double yaw_rate_bias_sigma{0.003};    ///< rad/s, of the bias at the start
-  double yaw_rate_bias_walk{5e-5};      ///< rad/s/sqrt(s)
-  double speed_noise_density{0.005};    ///< m/s/sqrt(Hz)
-  double yaw_rate_noise_density{5e-4};  ///< rad/s/sqrt(Hz)
-  double tick{0.0005};                  ///< m of wheel travel per encoder tick; 0: none
-  double steering_resolution{0.001};    ///< rad, for bicycle; 0: none
-  double track_width{1.5};              ///< m, between the wheels, for differential
-  double slip_interval{120.0};          ///< s, mean time from the end of a slip to the next; 0: no slip
-  double slip_duration{0.5};            ///< s
-  double slip_share{0.2};               ///< extra turn of a slipping wheel, as a share of its turn
+  double rate{50.0};
+  double speed_scale_sigma{0.01};
+  double yaw_rate_scale_sigma{0.01};
+  double yaw_rate_bias_sigma{0.003};
+  double yaw_rate_bias_walk{5e-5};
+  double speed_noise_density{0.005};
+  double yaw_rate_noise_density{5e-4};
+  double tick{0.0005};
+  double steering_resolution{0.001};
+  double track_width{1.5};
+  double slip_interval{120.0};
+  double slip_duration{0.5};
+  double slip_share{0.2};
 
-  template <class V>
-  void visit(V& v) {
-    v("rate", rate, between(1.0, 1000.0));
-    v("speed_scale_sigma", speed_scale_sigma, between(0.0, 0.2));
-    v("yaw_rate_scale_sigma", yaw_rate_scale_sigma, between(0.0, 0.2));
-    v("yaw_rate_bias_sigma", yaw_rate_bias_sigma, non_negative());
-    v("yaw_rate_bias_walk", yaw_rate_bias_walk, non_negative());
-    v("speed_noise_density", speed_noise_density, non_negative());
-    v("yaw_rate_noise_density", yaw_rate_noise_density, non_negative());
-    v("tick", tick, non_negative());
-    v("steering_resolution", steering_resolution, non_negative());
-    v("track_width", track_width, positive());
-    v("slip_interval", slip_interval, non_negative());
-    v("slip_duration", slip_duration, positive());
-    v("slip_share", slip_share, between(0.0, 10.0));
+  void visit(ParameterVisitor& v) {
+    v("rate", rate, between(1.0, 1000.0), "", "Hz");
+    v("speed_scale_sigma", speed_scale_sigma, between(0.0, 0.2), "", "of the factor on the speed, drawn once a run");
+    v("yaw_rate_scale_sigma", yaw_rate_scale_sigma, between(0.0, 0.2), "",
+      "of the factor on the yaw rate, drawn once a run");
+    v("yaw_rate_bias_sigma", yaw_rate_bias_sigma, non_negative(), "rad/s", "of the bias at the start");
+    v("yaw_rate_bias_walk", yaw_rate_bias_walk, non_negative(), "", "rad/s/sqrt(s)");
+    v("speed_noise_density", speed_noise_density, non_negative(), "", "m/s/sqrt(Hz)");
+    v("yaw_rate_noise_density", yaw_rate_noise_density, non_negative(), "", "rad/s/sqrt(Hz)");
+    v("tick", tick, non_negative(), "m", "of wheel travel per encoder tick; 0: none");
+    v("steering_resolution", steering_resolution, non_negative(), "rad", "for bicycle; 0: none");
+    v("track_width", track_width, positive(), "m", "between the wheels, for differential");
+    v("slip_interval", slip_interval, non_negative(), "s", "mean time from the end of a slip to the next; 0: no slip");
+    v("slip_duration", slip_duration, positive(), "", "s");
+    v("slip_share", slip_share, between(0.0, 10.0), "", "extra turn of a slipping wheel, as a share of its turn");
   }
-  void check(std::vector<std::string>&) const {}
 };
 
 struct WheelOdometryMessage {

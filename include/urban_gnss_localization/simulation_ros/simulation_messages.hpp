@@ -30,12 +30,11 @@ struct SimulationFrames {
   std::string imu{"imu_link"};
   std::string lidar{"lidar"};
 
-  template <class V>
-  void visit(V& v) {
-    base.visit(v);
-    v("gps_frame", gps);
-    v("imu_frame", imu);
-    v("lidar_frame", lidar);
+  void visit(ParameterVisitor& v) {
+    v.include(base);
+    v("gps_frame", gps, "");
+    v("imu_frame", imu, "");
+    v("lidar_frame", lidar, "");
   }
   void check(std::vector<std::string>& faults) const;
 };

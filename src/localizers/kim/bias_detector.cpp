@@ -10,11 +10,6 @@
 #include "urban_gnss_localization/gnss/chi_squared.hpp"
 
 namespace urban_gnss {
-namespace {
-
-constexpr int kFixDof = 2;
-
-}  // namespace
 
 double normalised_innovation_squared(const Eigen::Vector2d& innovation, const Eigen::Matrix2d& covariance) {
   return innovation.dot(covariance.ldlt().solve(innovation));

@@ -9,12 +9,16 @@
 namespace urban_gnss {
 namespace {
 
-constexpr int kFixDof = 2;
-/// A robot that moves less than this between two fixes stands.
-constexpr double kParked_mps = 0.02;
 /// A heading with a larger standard deviation than this (rad) is unknown; that of a uniform one is 1.81.
 constexpr double kUnknownHeading_rad = 1.5;
 const Eigen::Matrix2d kBiasObservation = Eigen::Matrix2d::Identity();  // C: the bias adds to the fix
+
+/// The paper's states alone: what is wrong with the odometry is 0 and stays so.
+OdometryErrorParameters without_odometry_errors(OdometryErrorParameters odometry) {
+  odometry.speed_scale_sigma = odometry.speed_scale_walk = 0.0;
+  odometry.yaw_rate_bias_sigma = odometry.yaw_rate_bias_walk = 0.0;
+  return odometry;
+}
 
 }  // namespace
 
@@ -28,10 +32,12 @@ EnumNames<LockoutPolicy> enum_names(LockoutPolicy) {
   return {{"automatic", LockoutPolicy::kAutomatic}, {"dead_reckoning", LockoutPolicy::kDeadReckoning}};
 }
 
-void ComplementaryEkfParameters::check(std::vector<std::string>& faults) const {
-  detector.check(faults);
-  fix_noise.check(faults);
-  odometry.check(faults);
+MotionParameters kim_motion() {
+  MotionParameters motion;
+  motion.odom_alpha1 = 4e-4;
+  motion.odom_alpha4 = 9e-4;
+  motion.odom_alpha2 = motion.odom_alpha3 = motion.odom_alpha5 = motion.odom_alpha6 = 0.0;
+  return motion;
 }
 
 ComplementaryEkf::ComplementaryEkf(const ComplementaryEkfParameters& parameters)
@@ -40,6 +46,7 @@ ComplementaryEkf::ComplementaryEkf(const ComplementaryEkfParameters& parameters)
       noise_monitor_(parameters.fix_noise),
       close_threshold_(chi_squared_quantile(parameters.close_probability, kFixDof)),
       spike_threshold_(2.0 * detector_.threshold()) {  // of two degrees of freedom: the false alarms of false alarms
+  if (!parameters_.estimate_odometry_errors) parameters_.odometry = without_odometry_errors(parameters_.odometry);
   initialize({});
 }
 
@@ -60,24 +67,23 @@ void ComplementaryEkf::initialize(const PoseEstimate& start) {
   heading_search_.reset();
   if (start.covariance(2, 2) > kUnknownHeading_rad * kUnknownHeading_rad)
     heading_search_.emplace(HeadingInitializerParameters{});
-  moved_since_fix_m_ = 0.0;
-  elapsed_since_fix_s_ = 0.0;
+  since_fix_ = {};
   last_test_covariance_.setZero();
   bias_estimates_.clear();
 }
 
 void ComplementaryEkf::move(const Twist2& twist, double duration_s) {
-  DeadReckoningStep step = dead_reckon(pose_, errors_, twist, duration_s, parameters_.odometry);
-  const double distance = std::abs(twist.speed_mps) * duration_s;
+  const MotionStep motion = make_motion_step(twist, duration_s, parameters_.motion, parameters_.odometry);
+  DeadReckoningStep step = dead_reckon(pose_, errors_, motion, parameters_.odometry);
   if (heading_search_) {
     // Which way it went is unknown: the position stays and becomes uncertain by the distance.
-    step.noise.topLeftCorner<2, 2>().diagonal().array() += distance * (distance + 2.0 * moved_since_fix_m_);
+    const double distance_m = std::abs(twist.speed_mps) * duration_s;
+    step.noise.topLeftCorner<2, 2>().diagonal().array() += distance_m * (distance_m + 2.0 * since_fix_.distance_m);
     step.transition.topRows<2>().rightCols<3>().setZero();
     step.pose.x = pose_.x;
     step.pose.y = pose_.y;
   }
-  moved_since_fix_m_ += distance;
-  elapsed_since_fix_s_ += duration_s;
+  since_fix_.add(twist, duration_s);
   filter_.predict(step.transition * filter_.bias_free_state(), step.transition, step.noise);
   path_ += step.pose.position() - pose_.position();
   path_variance_m2_ += 0.5 * step.noise.topLeftCorner<2, 2>().trace();
@@ -124,8 +130,7 @@ FixVerdict ComplementaryEkf::correct(const FixMeasurement& fix) {
   }
   last_fix_s_ = fix.time_s;
   had_fix_ = true;
-  moved_since_fix_m_ = 0.0;
-  elapsed_since_fix_s_ = 0.0;
+  since_fix_ = {};
   publish(fix, predicted, verdict);
   return verdict;
 }
@@ -137,10 +142,9 @@ bool ComplementaryEkf::is_adaptive() const {
 double ComplementaryEkf::noise_inflation() const {
   if (!is_adaptive()) return 1.0;
   const double inflation = noise_monitor_.inflation();
-  const bool is_parked = elapsed_since_fix_s_ > 0.0 && moved_since_fix_m_ < kParked_mps * elapsed_since_fix_s_;
-  if (!is_parked) return inflation;
+  if (!since_fix_.is_standstill()) return inflation;
   // The mean of errors of correlation time tau over a time T has the variance 2 tau / T of one of them.
-  return std::max(inflation, 2.0 * parameters_.parked_correlation_time / elapsed_since_fix_s_);
+  return std::max(inflation, 2.0 * parameters_.parked_correlation_time / since_fix_.duration_s);
 }
 
 bool ComplementaryEkf::search_heading(const FixMeasurement& fix, const Innovation& innovation) {
@@ -285,7 +289,7 @@ void ComplementaryEkf::reject(const Innovation& innovation, FixVerdict& verdict)
 void ComplementaryEkf::restart_position(const Innovation& innovation) {
   close();
   ErrorCovariance covariance = filter_.compensated_covariance();
-  // As uncertain as the fix shows it to be wrong; heading and odometry errors are kept (F8).
+  // As uncertain as the fix shows it to be wrong; heading and odometry errors are kept.
   covariance.topLeftCorner<2, 2>() += innovation.value * innovation.value.transpose();
   filter_.set_state(ErrorState::Zero(), covariance);
   apply(innovation);

@@ -6,14 +6,15 @@
 #include <limits>
 #include <stdexcept>
 
-#include "urban_gnss_localization/motion/dead_reckoning.hpp"
+#include "urban_gnss_localization/common/positive_definite.hpp"
 #include "urban_gnss_localization/gnss/chi_squared.hpp"
 #include "urban_gnss_localization/gnss/correlated_errors.hpp"
+#include "urban_gnss_localization/motion/dead_reckoning.hpp"
+#include "urban_gnss_localization/motion/standstill.hpp"
 
 namespace urban_gnss {
 namespace {
 
-constexpr int kFixDof = 2;
 constexpr int kNoise = 3;  ///< speed, second input, yaw rate: MotionNoise
 constexpr int kAugmented = Ukf::kDimension + kNoise;
 constexpr int kYaw = 2;
@@ -63,7 +64,7 @@ void Ukf::initialize(const PoseEstimate& start) {
 
 void Ukf::move(const Twist2& twist, double duration_s) {
   if (!is_usable(twist, duration_s)) return;
-  if (is_parked(twist)) {
+  if (is_standstill(twist)) {
     Covariance covariance = covariance_;
     const double walk = parameters_.odometry.parked_walk;
     covariance.diagonal().head<2>().array() += walk * walk * duration_s;

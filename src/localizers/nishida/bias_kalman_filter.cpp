@@ -8,8 +8,6 @@
 namespace urban_gnss {
 namespace {
 
-constexpr int kFixDof = 2;
-
 Eigen::Matrix<double, 2, 4> observation() {
   Eigen::Matrix<double, 2, 4> c = Eigen::Matrix<double, 2, 4>::Zero();
   c(0, 0) = 1.0;
@@ -86,7 +84,7 @@ void BiasTracker::start(const Eigen::Vector2d& measurement) {
 }
 
 const BiasEstimate& BiasTracker::process(const LocalFix& fix, const Eigen::Vector2d& predicted_antenna_position,
-                                         const FixVerdict& sanitation) {
+                                         const FixVerdict& validation) {
   const bool on_position = parameters_.bias_input == BiasInput::kPosition;
   const Eigen::Vector2d measurement =
       on_position ? fix.position : Eigen::Vector2d(fix.position - predicted_antenna_position);
@@ -102,7 +100,7 @@ const BiasEstimate& BiasTracker::process(const LocalFix& fix, const Eigen::Vecto
   estimate_.fix_position = fix.position;
   estimate_.predicted_antenna_position = predicted_antenna_position;
 
-  FixVerdict verdict = sanitation;
+  FixVerdict verdict = validation;
   verdict.stamp = fix.stamp;
   BiasKalmanFilter::Innovation innovation = filter_.innovation(measurement, noise);
   verdict.nis = innovation.nis();
@@ -133,9 +131,9 @@ const BiasEstimate& BiasTracker::process(const LocalFix& fix, const Eigen::Vecto
   estimate_.shadow_statistic = estimate_.bias.dot(estimate_.covariance.ldlt().solve(estimate_.bias));
   estimate_.in_shadow = estimate_.shadow_statistic > estimate_.shadow_threshold;
   verdict.decision = estimate_.in_shadow ? FixDecision::kBiasCompensated
-                     : is_rejected(sanitation.decision) || sanitation.decision == FixDecision::kNotExamined
+                     : is_rejected(validation.decision) || validation.decision == FixDecision::kNotExamined
                          ? FixDecision::kAccepted
-                         : sanitation.decision;
+                         : validation.decision;
   estimate_.verdict = verdict;
   return estimate_;
 }

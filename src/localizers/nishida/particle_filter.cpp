@@ -6,17 +6,12 @@
 #include "urban_gnss_localization/gnss/chi_squared.hpp"
 
 namespace urban_gnss {
-namespace {
-
-constexpr int kFixDof = 2;
-
-}  // namespace
+namespace {}  // namespace
 
 EnumNames<ParticleFilterMode> enum_names(ParticleFilterMode) {
   return {{"literal", ParticleFilterMode::kLiteral},
           {"paper", ParticleFilterMode::kPaper},
-          {"conventional", ParticleFilterMode::kConventional},
-          {"switching", ParticleFilterMode::kSwitching}};
+          {"conventional", ParticleFilterMode::kConventional}};
 }
 
 EnumNames<LikelihoodChoice> enum_names(LikelihoodChoice) {
@@ -28,10 +23,6 @@ EnumNames<LikelihoodChoice> enum_names(LikelihoodChoice) {
 
 EnumNames<Switch> enum_names(Switch) {
   return {{"auto", Switch::kAuto}, {"always", Switch::kAlways}, {"never", Switch::kNever}};
-}
-
-EnumNames<EstimateMethod> enum_names(EstimateMethod) {
-  return {{"mean", EstimateMethod::kMean}, {"heaviest_cluster", EstimateMethod::kHeaviestCluster}};
 }
 
 void ParticleFilterParameters::check(std::vector<std::string>& faults) const {
@@ -93,8 +84,8 @@ FixVerdict ParticleFilter::correct(const FixMeasurement& fix) {
   had_fix_ = true;
 
   // Sample: the motion has been drawn by move(); what is left of (22) is the ring.
-  ring_.sample(particles_, estimate_, fix.bias_radius_m, parameters_.model.fix.direct_sigma,
-               parameters_.model.fix.shadow_sigma, engine_);
+  ring_.sample(particles_, estimate_, fix.bias_radius_m, parameters_.fix.direct_sigma, parameters_.fix.shadow_sigma,
+               engine_);
 
   // Weigh.
   weigh(particles_, likelihood_of(fix));
@@ -156,8 +147,8 @@ FixLikelihood ParticleFilter::likelihood_of(const FixMeasurement& fix) const {
   likelihood.with_heading = parameters_.uses_gps_heading();
   likelihood.fix = fix.position;
   likelihood.antenna_in_body = fix.antenna_in_body;
-  likelihood.direct_covariance = parameters_.model.fix.direct_covariance(fix.covariance);
-  likelihood.shadow_sigma = parameters_.model.fix.shadow_sigma;
+  likelihood.direct_covariance = parameters_.fix.direct_covariance(fix.covariance);
+  likelihood.shadow_sigma = parameters_.fix.shadow_sigma;
   likelihood.heading_sigma = parameters_.gps_heading_sigma;
   likelihood.radius = fix.bias_radius_m;
   likelihood.fix_heading = fix_heading(fix.position, last_fix_position_, turn_since_fix_);

@@ -4,10 +4,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "urban_gnss_localization/gnss/chi_squared.hpp"
+
 namespace urban_gnss {
 namespace {
 
-constexpr int kFixDof = 2;
 constexpr int kVelocityDof = 2;
 constexpr int kYaw = 2;
 constexpr int kSpeedScale = 3;
@@ -15,17 +16,6 @@ constexpr int kYawRateScale = kErrorStates;
 
 using Sensitivity = Eigen::Matrix<double, 2, kBiasStates>;
 using Gain = Eigen::Matrix<double, kBiasStates, 2>;
-
-/// A fix of ranges tells its own covariance; what is learnt is how good ranges in line of sight are: the factor on the
-/// square of middle_range_sigma_m().
-FixNoiseModelParameters range_noise(const SwitchingModelParameters& p) {
-  FixNoiseModelParameters noise = p.noise;
-  noise.fix_correlation_time = p.ranges.range_correlation_time;
-  const double middle_m = p.ranges.middle_range_sigma_m();
-  noise.fix_scale_limit = p.ranges.range_sigma_max / middle_m;
-  noise.first_fix_scale = std::pow(p.ranges.range_sigma / middle_m, 2);
-  return noise;
-}
 
 void make_symmetric(BiasEkfCovariance& covariance) { covariance = 0.5 * (covariance + covariance.transpose().eval()); }
 
@@ -146,88 +136,6 @@ BiasEkfUpdate take_velocity(BiasGaussian& state, const VelocityMeasurement& meas
   update.log_likelihood =
       -0.5 * (dof + kVelocityDof) * std::log1p(update.nis / dof) - 0.5 * std::log(plain.determinant());
   return update;
-}
-
-ReceiverModel::ReceiverModel(const SwitchingModelParameters& parameters)
-    : parameters_(parameters),
-      noise_(parameters.noise, parameters.fix_scale_lag),
-      range_noise_(range_noise(parameters)),
-      velocity_scale_(parameters.velocity.fresh_scale()) {}
-
-void ReceiverModel::reset() {
-  noise_.reset();
-  range_noise_.reset();
-  free_signals_.reset();
-  of_ranges_ = false;
-  velocity_scale_ = parameters_.velocity.fresh_scale();
-  last_fix_s_.reset();
-  moved_s_ = 0.0;
-  corrections_.setZero();
-  common_variance_m2_ = 0.0;
-}
-
-void ReceiverModel::move(const Twist2& twist, double duration_s) {
-  moved_s_ += duration_s;
-  noise_.move(twist, duration_s);
-  range_noise_.move(twist, duration_s);
-}
-
-double ReceiverModel::elapsed_s(double time_s) const {
-  return last_fix_s_ ? std::max(time_s - *last_fix_s_, 0.0) : moved_s_;
-}
-
-double ReceiverModel::range_sigma_m() const {
-  if (parameters_.noise.fix_scale_rate == 0.0) return parameters_.ranges.range_sigma;
-  return parameters_.ranges.middle_range_sigma_m() * std::sqrt(range_noise_.scale());
-}
-
-FixMeasurement ReceiverModel::believed(const FixMeasurement& fix, const BiasGaussian& before) {
-  FixMeasurement weighed = fix;
-  of_ranges_ = false;
-  if (parameters_.ranges.use_ranges && !fix.satellites.empty()) {
-    free_signals_.add(fix.satellites, parameters_.ranges);
-    RelativePlace known;
-    known.offset = transform_point(before.pose(), fix.antenna_in_body) - fix.position;
-    known.covariance = before.covariance.topLeftCorner<2, 2>();
-    const auto level = free_signals_.cn0_dbhz();
-    RangeFixParameters ranges = parameters_.ranges;
-    ranges.range_sigma = range_sigma_m();
-    const auto place = level ? range_fix(fix.satellites, *level, known, ranges) : std::nullopt;
-    if (place) {
-      of_ranges_ = true;
-      weighed.position += place->offset;
-      weighed.covariance = place->covariance;
-      return weighed;
-    }
-  }
-  weighed.covariance = noise_.believed(fix.covariance);
-  return weighed;
-}
-
-void ReceiverModel::learn_velocity(double exceeding, const BiasGaussian& before, const BiasGaussian& after) {
-  velocity_scale_.learn(exceeding);
-  corrections_ += after.mean.head<2>() - before.mean.head<2>();
-}
-
-void ReceiverModel::learn_fix(double time_s, double exceeding) {
-  (of_ranges_ ? range_noise_ : noise_).learn(time_s, exceeding);
-  last_fix_s_ = time_s;
-}
-
-void ReceiverModel::compare_with_odometry(const FixMeasurement& fix, const BiasGaussian& before,
-                                          const BiasGaussian& after) {
-  const double walk = parameters_.odometry.position_walk;
-  DeadReckonedFix beside;
-  beside.place = transform_point(before.pose(), fix.antenna_in_body) - corrections_;
-  beside.misfit = fix.position - beside.place;
-  beside.covariance = parameters_.fix.direct_covariance(fix.covariance);
-  beside.walk_m2 = walk * walk * moved_s_;
-  beside.heading_sigma_rad = std::sqrt(before.covariance(kYaw, kYaw));
-  beside.time_s = fix.time_s;
-  if (!of_ranges_) noise_.compare(beside);
-  corrections_ += after.mean.head<2>() - before.mean.head<2>();
-  const double common = parameters_.common_error_sigma;
-  common_variance_m2_ = std::min(common * common, 0.5 * beside.covariance.trace());
 }
 
 }  // namespace urban_gnss

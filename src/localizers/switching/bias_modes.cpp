@@ -61,15 +61,6 @@ Rates transition_of(const Rates& rates, double time_s) {
 
 }  // namespace
 
-Eigen::Matrix2d FixSigmaParameters::direct_covariance(const Eigen::Matrix2d& declared) const {
-  return use_fix_covariance ? declared : Eigen::Matrix2d(direct_sigma * direct_sigma * Eigen::Matrix2d::Identity());
-}
-
-Eigen::Matrix2d FixSigmaParameters::shadow_covariance(const Eigen::Matrix2d& declared) const {
-  const double ratio = shadow_sigma / direct_sigma;
-  return ratio * ratio * direct_covariance(declared);
-}
-
 double BiasModeParameters::outlier_density() const { return outlier_share / (kPi * outlier_radius * outlier_radius); }
 
 ModeTransition mode_transition(double elapsed_s, const BiasModeParameters& p, double bias_odds) {

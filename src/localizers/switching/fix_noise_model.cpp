@@ -9,8 +9,6 @@
 namespace urban_gnss {
 namespace {
 
-/// Slower than this on average since the last fix, the robot stands.
-constexpr double kParked_mps = 0.05;
 /// Weight of a fix in the mean of what fixes declare.
 constexpr double kMeanRate = 0.03;
 /// ln of the most by which a declared variance is changed: one that says "worth nothing" is still worth next to
@@ -28,16 +26,12 @@ void FixNoiseModel::reset() {
   lagged_scale_.reset();
   fixes_.clear();
   last_s_.reset();
-  moved_m_ = 0.0;
-  elapsed_s_ = 0.0;
+  since_fix_ = {};
 }
 
-void FixNoiseModel::move(const Twist2& twist, double duration_s) {
-  moved_m_ += std::abs(twist.speed_mps) * duration_s;
-  elapsed_s_ += duration_s;
-}
+void FixNoiseModel::move(const Twist2& twist, double duration_s) { since_fix_.add(twist, duration_s); }
 
-Eigen::Matrix2d FixNoiseModel::believed(const Eigen::Matrix2d& declared) {
+Eigen::Matrix2d FixNoiseModel::effective_covariance(const Eigen::Matrix2d& declared) {
   const double now = log_variance(declared);
   if (!log_mean_variance_) log_mean_variance_ = now;
   *log_mean_variance_ += kMeanRate * (now - *log_mean_variance_);
@@ -46,16 +40,15 @@ Eigen::Matrix2d FixNoiseModel::believed(const Eigen::Matrix2d& declared) {
 }
 
 double FixNoiseModel::correlation_inflation(double time_s) const {
-  const bool is_parked = elapsed_s_ > 0.0 && moved_m_ < kParked_mps * elapsed_s_;
-  const double correlation_s = is_parked ? parameters_.parked_correlation_time : parameters_.fix_correlation_time;
+  const double correlation_s =
+      since_fix_.is_standstill() ? parameters_.parked_correlation_time : parameters_.fix_correlation_time;
   return last_s_ ? markov_inflation(time_s - *last_s_, correlation_s) : 1.0;
 }
 
 void FixNoiseModel::learn(double time_s, double exceeding) {
   scale_.learn(exceeding);
   last_s_ = time_s;
-  moved_m_ = 0.0;
-  elapsed_s_ = 0.0;
+  since_fix_ = {};
 }
 
 void FixNoiseModel::compare(const DeadReckonedFix& fix) {

@@ -10,7 +10,6 @@
 namespace urban_gnss {
 namespace {
 
-constexpr int kFixDof = 2;
 constexpr int kYaw = 2;
 /// Of direct reception's normalised innovation, for the verdict alone.
 constexpr double kReportedQuantile = 0.99;
@@ -30,7 +29,7 @@ ImmEkf::ImmEkf(const ImmEkfParameters& parameters, const MotionParameters& motio
     : parameters_(parameters),
       motion_(motion),
       nis_threshold_(chi_squared_quantile(kReportedQuantile, kFixDof)),
-      receiver_(parameters) {
+      statistics_(parameters) {
   initialize({});
 }
 
@@ -39,12 +38,12 @@ void ImmEkf::initialize(const PoseEstimate& start) {
   if (!start.covariance.allFinite()) throw std::invalid_argument("imm_ekf: the covariance to start from is not finite");
   filters_.fill(start_gaussian(start, parameters_));
   probability_ << 1.0, 0.0, 0.0;
-  receiver_.reset();
+  statistics_.reset();
 }
 
 void ImmEkf::move(const Twist2& twist, double duration_s) {
   if (!is_usable(twist, duration_s)) return;
-  receiver_.move(twist, duration_s);
+  statistics_.move(twist, duration_s);
   const MotionStep step = make_motion_step(twist, duration_s, motion_, parameters_.odometry);
   for (Gaussian& filter : filters_) predict(filter, step, parameters_.odometry);
 }
@@ -71,11 +70,11 @@ FixVerdict ImmEkf::correct(const FixMeasurement& declared) {
     return verdict;
   }
   const Gaussian before = mixture();
-  const FixMeasurement fix = receiver_.believed(declared, before);
-  verdict.of_ranges = receiver_.of_ranges();
-  const double elapsed_s = receiver_.elapsed_s(fix.time_s);
-  const FixNoise noise = receiver_.fix_noise(fix.time_s);
-  const ModeTransition transition = mode_transition(elapsed_s, parameters_.modes, receiver_.bias_odds());
+  const FixMeasurement fix = statistics_.effective_fix(declared, before);
+  verdict.of_ranges = statistics_.of_ranges();
+  const double elapsed_s = statistics_.elapsed_s(fix.time_s);
+  const FixNoise noise = statistics_.fix_noise(fix.time_s);
+  const ModeTransition transition = mode_transition(elapsed_s, parameters_.modes, statistics_.bias_odds());
   const Eigen::Vector4d prior = transition.transpose() * probability_;
   std::array<Gaussian, kContinuations> next;
   std::array<BiasEkfUpdate, kContinuations> updates;
@@ -105,7 +104,7 @@ FixVerdict ImmEkf::correct(const FixMeasurement& declared) {
     any_outlier += (posterior[j] /= sum) * updates[j].outlier;
     if (updates[j].white_nis > LearntScale::kMedianNis) exceeding += posterior[j];
   }
-  receiver_.learn_fix(fix.time_s, exceeding);
+  statistics_.learn_fix(fix.time_s, exceeding);
 
   constexpr std::size_t kSlow = index_of(BiasMode::kSlow);
   constexpr std::size_t kJump = index_of(BiasMode::kJump);
@@ -116,7 +115,7 @@ FixVerdict ImmEkf::correct(const FixMeasurement& declared) {
     filters_[kSlow] = mixture_of<2>({next[kSlow], next[kJump]}, {posterior[kSlow] / slow, posterior[kJump] / slow});
   }
   probability_ << posterior[index_of(BiasMode::kDirect)], slow, posterior[index_of(BiasMode::kFast)];
-  receiver_.compare_with_odometry(fix, before, mixture());
+  statistics_.compare_with_odometry(fix, before, mixture());
 
   verdict.decision = probability_[0] >= 0.5 ? FixDecision::kAccepted : FixDecision::kBiasCompensated;
   if (any_outlier > 0.5) {
@@ -128,7 +127,7 @@ FixVerdict ImmEkf::correct(const FixMeasurement& declared) {
 
 void ImmEkf::correct_velocity(const VelocityMeasurement& measured) {
   if (!is_usable(measured)) return;
-  const Eigen::Matrix2d noise = receiver_.velocity_scale() * measured.covariance;
+  const Eigen::Matrix2d noise = statistics_.velocity_scale() * measured.covariance;
   std::array<Gaussian, kLastingModes> next = filters_;
   ModeProbabilities log_weight;
   double exceeding = 0.0;
@@ -142,7 +141,7 @@ void ImmEkf::correct_velocity(const VelocityMeasurement& measured) {
   filters_ = next;
   probability_ = probability_.cwiseProduct((log_weight.array() - log_weight.maxCoeff()).exp().matrix());
   probability_ /= probability_.sum();
-  receiver_.learn_velocity(exceeding, before, mixture());
+  statistics_.learn_velocity(exceeding, before, mixture());
 }
 
 Gaussian ImmEkf::mixture() const {
@@ -154,7 +153,7 @@ Pose2 ImmEkf::pose() const { return mixture().pose(); }
 PoseEstimate ImmEkf::estimate() const {
   const Gaussian all = mixture();
   PoseEstimate estimate{all.pose(), all.covariance.topLeftCorner<3, 3>()};
-  estimate.covariance.diagonal().head<2>().array() += receiver_.common_variance_m2();
+  estimate.covariance.diagonal().head<2>().array() += statistics_.common_variance_m2();
   return estimate;
 }
 

@@ -11,7 +11,6 @@
 namespace urban_gnss {
 namespace {
 
-constexpr int kFixDof = 2;
 constexpr int kYaw = 2;
 constexpr double kReportedQuantile = 0.99;
 /// Standard deviations within which particles belong to the cluster of a heavier one.
@@ -49,14 +48,14 @@ void slice_heading(const BiasGaussian& start, std::size_t most, std::vector<Bias
 
 }  // namespace
 
-SwitchingParticleFilter::SwitchingParticleFilter(const ParticleFilterParameters& parameters,
+SwitchingParticleFilter::SwitchingParticleFilter(const SwitchingParticleFilterParameters& parameters,
                                                  const MotionParameters& motion)
     : ParticleLocalizer(static_cast<std::size_t>(parameters.max_particles) + 1),
       parameters_(parameters),
       motion_(motion),
       nis_threshold_(chi_squared_quantile(kReportedQuantile, kFixDof)),
       most_(static_cast<std::size_t>(parameters.max_particles)),
-      receiver_(parameters.model),
+      statistics_(parameters.model),
       reducer_(kContinuations * (most_ + 1)) {
   hypotheses_.reserve(kContinuations * (most_ + 1));
   next_.reserve(kContinuations * (most_ + 1));
@@ -69,27 +68,27 @@ SwitchingParticleFilter::SwitchingParticleFilter(const ParticleFilterParameters&
 
 void SwitchingParticleFilter::initialize(const PoseEstimate& start) {
   if (!is_finite(start.pose) || !start.covariance.allFinite()) {
-    throw std::invalid_argument("particle_filter: the pose to start from is not finite");
+    throw std::invalid_argument("switching_particle_filter: the pose to start from is not finite");
   }
   engine_ = make_engine(static_cast<std::uint64_t>(parameters_.seed));
   slice_heading(start_gaussian(start, parameters_.model), most_, hypotheses_);
-  receiver_.reset();
+  statistics_.reset();
   draw_cloud();
   find_clusters();
 }
 
 void SwitchingParticleFilter::move(const Twist2& twist, double duration_s) {
   if (!is_usable(twist, duration_s)) return;
-  receiver_.move(twist, duration_s);
+  statistics_.move(twist, duration_s);
   const MotionStep step = make_motion_step(twist, duration_s, motion_, parameters_.model.odometry);
   for (BiasHypothesis& each : hypotheses_) predict(each.state, step, parameters_.model.odometry);
   update_estimate();
 }
 
 bool SwitchingParticleFilter::continue_all(const FixMeasurement& fix, Opinion& opinion) {
-  const double elapsed_s = receiver_.elapsed_s(fix.time_s);
-  const FixNoise noise = receiver_.fix_noise(fix.time_s);
-  const ModeTransition transition = mode_transition(elapsed_s, parameters_.model.modes, receiver_.bias_odds());
+  const double elapsed_s = statistics_.elapsed_s(fix.time_s);
+  const FixNoise noise = statistics_.fix_noise(fix.time_s);
+  const ModeTransition transition = mode_transition(elapsed_s, parameters_.model.modes, statistics_.bias_odds());
   next_.clear();
   for (const BiasHypothesis& before : hypotheses_) {
     for (const BiasMode to : kModes) {
@@ -128,8 +127,8 @@ FixVerdict SwitchingParticleFilter::correct(const FixMeasurement& declared) {
     return verdict;
   }
   const BiasGaussian before = mixture();
-  const FixMeasurement fix = receiver_.believed(declared, before);
-  verdict.of_ranges = receiver_.of_ranges();
+  const FixMeasurement fix = statistics_.effective_fix(declared, before);
+  verdict.of_ranges = statistics_.of_ranges();
   const Eigen::Vector2d innovation = fix.position - transform_point(estimate_, fix.antenna_in_body);
   const Eigen::Matrix2d covariance =
       before.covariance.topLeftCorner<2, 2>() + parameters_.model.fix.direct_covariance(fix.covariance);
@@ -144,8 +143,8 @@ FixVerdict SwitchingParticleFilter::correct(const FixMeasurement& declared) {
   }
   reducer_.select(next_, most_, engine_);
   hypotheses_.swap(next_);
-  receiver_.learn_fix(fix.time_s, opinion.exceeding);
-  receiver_.compare_with_odometry(fix, before, mixture());
+  statistics_.learn_fix(fix.time_s, opinion.exceeding);
+  statistics_.compare_with_odometry(fix, before, mixture());
   draw_cloud();
   find_clusters();
 
@@ -159,7 +158,7 @@ FixVerdict SwitchingParticleFilter::correct(const FixMeasurement& declared) {
 
 void SwitchingParticleFilter::correct_velocity(const VelocityMeasurement& measured) {
   if (!is_usable(measured)) return;
-  const Eigen::Matrix2d noise = receiver_.velocity_scale() * measured.covariance;
+  const Eigen::Matrix2d noise = statistics_.velocity_scale() * measured.covariance;
   next_ = hypotheses_;
   double exceeding = 0.0;
   double largest = -std::numeric_limits<double>::infinity();
@@ -176,7 +175,7 @@ void SwitchingParticleFilter::correct_velocity(const VelocityMeasurement& measur
   for (BiasHypothesis& next : next_) next.weight /= sum;
   const BiasGaussian before = mixture();
   hypotheses_.swap(next_);
-  receiver_.learn_velocity(exceeding, before, mixture());
+  statistics_.learn_velocity(exceeding, before, mixture());
   find_clusters();
 }
 
@@ -254,7 +253,7 @@ PoseEstimate SwitchingParticleFilter::estimate() const {
                                 angle_difference(each.state.mean[kYaw], estimate_.yaw));
     estimate.covariance += each.weight * (each.state.covariance.topLeftCorner<3, 3>() + apart * apart.transpose());
   }
-  estimate.covariance.diagonal().head<2>().array() += receiver_.common_variance_m2();
+  estimate.covariance.diagonal().head<2>().array() += statistics_.common_variance_m2();
   return estimate;
 }
 
@@ -288,14 +287,6 @@ ModeProbabilities SwitchingParticleFilter::mode_probabilities() const {
     probabilities[static_cast<int>(index_of(each.mode))] += each.weight;
   }
   return probabilities;
-}
-
-std::unique_ptr<ParticleLocalizer> make_particle_filter(const ParticleFilterParameters& parameters,
-                                                        const MotionParameters& motion) {
-  if (parameters.mode == ParticleFilterMode::kSwitching) {
-    return std::make_unique<SwitchingParticleFilter>(parameters, motion);
-  }
-  return std::make_unique<ParticleFilter>(parameters, motion);
 }
 
 }  // namespace urban_gnss

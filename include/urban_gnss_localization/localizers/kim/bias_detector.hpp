@@ -8,21 +8,23 @@
 namespace urban_gnss {
 
 struct BiasDetectorParameters {
-  double gate_probability{0.99};   ///< probability that an unbiased fix is taken for one
-  double ramp_slack{0.5};          ///< sigma per fix, a drift of the innovation below this is not summed (CUSUM)
-  double ramp_threshold{8.0};      ///< sigma, sum at which a drift is detected; with these, once in 7800 fixes falsely
-  int inert_window{30};            ///< count of fixes over which the NIS is summed for "gate inert"
-  double inert_probability{1e-4};  ///< probability that a working gate is called inert
+  double gate_probability{0.99};
+  double ramp_slack{0.5};
+  double ramp_threshold{8.0};
+  int inert_window{30};
+  double inert_probability{1e-4};
 
-  template <class V>
-  void visit(V& v) {
-    v("gate_probability", gate_probability, between(0.5, 0.999999));
-    v("ramp_slack", ramp_slack, non_negative());
-    v("ramp_threshold", ramp_threshold, positive());
-    v("inert_window", inert_window, between(1, 10000));
-    v("inert_probability", inert_probability, between(1e-9, 0.1));
+  void visit(ParameterVisitor& v) {
+    v("gate_probability", gate_probability, between(0.5, 0.999999), "",
+      "probability that an unbiased fix is taken for one, 2 DOF (paper: 0.95)");
+    v("ramp_slack", ramp_slack, non_negative(), "",
+      "sigma per fix, drift of the innovations that is not summed (CUSUM)");
+    v("ramp_threshold", ramp_threshold, positive(), "",
+      "sigma, sum at which they drift: with 0.5 above, falsely once in 7800 fixes");
+    v("inert_window", inert_window, between(1, 10000), "", "of fixes that the \"gate inert\" warning looks at");
+    v("inert_probability", inert_probability, between(1e-9, 0.1), "",
+      "probability that a gate that works is called inert");
   }
-  void check(std::vector<std::string>&) const {}
 };
 
 /// What the tests say of one innovation.
@@ -30,7 +32,7 @@ struct BiasDetection {
   double nis{0.0};       ///< normalised innovation squared, chi-squared with 2 degrees of freedom without a bias
   bool is_jump{false};   ///< the NIS is above its quantile
   bool is_ramp{false};   ///< the innovations have drifted in one direction
-  bool is_inert{false};  ///< the NIS runs so far below its expectation that the test cannot find anything (F4)
+  bool is_inert{false};  ///< the NIS runs so far below its expectation that the test cannot find anything
   bool is_biased() const { return is_jump || is_ramp; }
 };
 
@@ -38,7 +40,7 @@ struct BiasDetection {
 /// degrees of freedom; a horizontal fix has two.
 ///
 /// Beside the NIS of one fix it watches the run of innovations: two-sided CUSUMs (Page 1954) of their whitened
-/// components find a bias that grows slowly, each step of it below the gate (F6).
+/// components find a bias that grows slowly, each step of it below the gate.
 class BiasDetector {
  public:
   /// Requires parameters without faults.
@@ -68,7 +70,7 @@ double normalised_innovation_squared(const Eigen::Vector2d& innovation, const Ei
 /// The length (m) of a sudden bias that a gate at `gate_probability` finds at the first fix with probability `power`,
 /// in the direction in which it is hardest to find. `covariance` (m^2) is the innovation's: declared covariance of the
 /// fix plus that of the short-horizon prediction. A jump below this is likely to be fused before it is noticed; it then
-/// moves the estimate by its gain, and the CUSUM has to find it (F5). Throws std::invalid_argument unless both
+/// moves the estimate by its gain, and the CUSUM has to find it. Throws std::invalid_argument unless both
 /// probabilities are in (0, 1) and the covariance is positive definite.
 double smallest_detectable_jump(const Eigen::Matrix2d& covariance, double gate_probability, double power = 0.9);
 

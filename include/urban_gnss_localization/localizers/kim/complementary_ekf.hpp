@@ -10,6 +10,7 @@
 #include "urban_gnss_localization/localizers/kim/two_stage_filter.hpp"
 #include "urban_gnss_localization/localizers/localizer.hpp"
 #include "urban_gnss_localization/motion/dead_reckoning.hpp"
+#include "urban_gnss_localization/motion/standstill.hpp"
 
 namespace urban_gnss {
 
@@ -20,53 +21,65 @@ enum class ComplementaryMode {
 };
 EnumNames<ComplementaryMode> enum_names(ComplementaryMode);
 
-/// What happens when the fixes contradict the estimate for long (F3).
+/// What happens when the fixes contradict the estimate for long.
 enum class LockoutPolicy {
   kAutomatic,      ///< after lockout_timeout the estimate is what is wrong: its position starts anew on the fixes
   kDeadReckoning,  ///< the odometry is believed until a fix agrees with it again, or a pose is set
 };
 EnumNames<LockoutPolicy> enum_names(LockoutPolicy);
 
+/// The Sigma_v of Kim et al.: 0.02 of the speed and 0.03 of the yaw rate, per sqrt(Hz).
+MotionParameters kim_motion();
+
 struct ComplementaryEkfParameters {
   ComplementaryMode mode{ComplementaryMode::kCompensated};
-  /// Standard and gated too take the noise as the fixes show it, and (gated) find ramps; false: the paper's
-  /// conventional filter (section 2.3), which believes what a fix declares.
   bool adapt_every_mode{true};
-  double fix_bias_sigma{20.0};     ///< m per axis, M0: the bias when its filter opens
-  double fix_bias_time{30.0};      ///< s, time after which a bias has faded; with fix_bias_sigma this gives Q_b
-  double close_probability{0.95};  ///< a bias inside this quantile is insignificant
-  int close_count{5};              ///< count of fixes in a row with an insignificant bias after which the filter closes
-  double detection_horizon{
-      10.0};  ///< s of odometry after which the tests' covariance grows no more while fixes are doubted
-  /// s, correlation time of a fix's error while the robot stands: reflections change little then (F34)
+  double fix_bias_sigma{20.0};
+  double fix_bias_time{30.0};
+  double close_probability{0.95};
+  int close_count{5};
+  double detection_horizon{10.0};
   double parked_correlation_time{150.0};
   LockoutPolicy lockout_policy{LockoutPolicy::kAutomatic};
-  double lockout_timeout{20.0};     ///< s of nothing but rejected fixes
-  double bias_open_timeout{120.0};  ///< s of an open bias filter
-  double lockout_gap{5.0};          ///< s without a fix that end such a run: what comes after a blackout counts anew
+  double lockout_timeout{20.0};
+  double bias_open_timeout{120.0};
+  double lockout_gap{5.0};
+  bool estimate_odometry_errors{true};
   BiasDetectorParameters detector;
   FixNoiseParameters fix_noise;
-  DeadReckoningParameters odometry;
+  OdometryErrorParameters odometry{1.0, 0.02, 2e-4, 0.005, 3e-5, 0.05, 0.003, 0.0};
+  MotionParameters motion = kim_motion();
 
-  template <class V>
-  void visit(V& v) {
-    v("mode", mode);
-    v("adapt_every_mode", adapt_every_mode);
-    v("fix_bias_sigma", fix_bias_sigma, positive());
-    v("fix_bias_time", fix_bias_time, positive());
-    v("close_probability", close_probability, between(0.01, 0.999999));
-    v("close_count", close_count, between(1, 10000));
-    v("detection_horizon", detection_horizon, non_negative());
-    v("parked_correlation_time", parked_correlation_time, non_negative());
-    v("lockout_policy", lockout_policy);
-    v("lockout_timeout", lockout_timeout, positive());
-    v("bias_open_timeout", bias_open_timeout, positive());
-    v("lockout_gap", lockout_gap, positive());
-    detector.visit(v);
-    fix_noise.visit(v);
-    odometry.visit(v);
+  void visit(ParameterVisitor& v) {
+    v.basic()("mode", mode,
+              "standard: all fixes as they are; gated: biased ones rejected; compensated: the bias is estimated");
+    v("adapt_every_mode", adapt_every_mode,
+      "standard and gated too: noise as the fixes show, gated also finds ramps; false: the paper's conventional filter "
+      "(section 2.3), which believes the declared covariance");
+    v("fix_bias_sigma", fix_bias_sigma, positive(), "m per axis", "M0: the bias when the filter opens");
+    v("fix_bias_time", fix_bias_time, positive(), "s",
+      "after which a bias has faded; with fix_bias_sigma this gives the growth of M");
+    v("close_probability", close_probability, between(0.01, 0.999999), "",
+      "a bias inside this quantile is insignificant");
+    v("close_count", close_count, between(1, 10000), "",
+      "of fixes with an insignificant bias after which the filter closes");
+    v("detection_horizon", detection_horizon, non_negative(), "s",
+      "of doubted fixes after which the odometry's growing uncertainty widens no test");
+    v("parked_correlation_time", parked_correlation_time, non_negative(), "s",
+      "correlation time of a fix's error while the robot stands");
+    v("lockout_policy", lockout_policy,
+      "automatic: position anew on the fixes; dead_reckoning: until a fix agrees again");
+    v("lockout_timeout", lockout_timeout, positive(), "s", "of nothing but rejected fixes");
+    v("bias_open_timeout", bias_open_timeout, positive(), "s", "of an open bias filter");
+    v("lockout_gap", lockout_gap, positive(), "s",
+      "without a fix that end such a run: after a blackout it counts anew");
+    v("estimate_odometry_errors", estimate_odometry_errors,
+      "speed scale and yaw-rate bias as states; false: the paper's (x, y, heading)");
+    v.group("detector", detector, "When a fix is taken for biased.");
+    v.group("fix_noise", fix_noise, "The noise of the fixes, as they show it.");
+    v.group("odometry", odometry, "The odometry's own errors.");
+    v.group("motion", motion, "Noise of the motion, Nishida et al. eq. (5) to (8).");
   }
-  void check(std::vector<std::string>& faults) const;
 };
 
 /// The complementary filter of Kim et al. with compensation of the fix's bias (Fig. 4).
@@ -90,6 +103,7 @@ class ComplementaryEkf : public Localizer {
   const char* name() const override { return "complementary_ekf"; }
   std::string mode() const override { return enum_name(parameters_.mode); }
   bool wants_bias() const override { return false; }
+  bool estimates_bias() const override { return true; }
   void initialize(const PoseEstimate& start) override;
   void move(const Twist2& twist, double duration_s) override;
   FixVerdict correct(const FixMeasurement& fix) override;
@@ -110,7 +124,7 @@ class ComplementaryEkf : public Localizer {
   bool is_bias_open() const { return is_open_; }
   Eigen::Vector2d bias() const { return filter_.bias(); }
   Eigen::Matrix2d bias_covariance() const { return filter_.bias_covariance(); }
-  /// Whether the gate cannot find anything, as the NIS runs far below its expectation (F4).
+  /// Whether the gate cannot find anything, as the NIS runs far below its expectation.
   bool is_gate_inert() const { return is_inert_; }
   /// smallest_detectable_jump (m) at the last fix; 0 before the first.
   double smallest_detectable_jump_m() const;
@@ -184,8 +198,7 @@ class ComplementaryEkf : public Localizer {
   bool is_inert_{false};
   std::optional<Run> run_;
   std::optional<HeadingInitializer> heading_search_;  ///< while the heading is unknown
-  double moved_since_fix_m_{0.0};
-  double elapsed_since_fix_s_{0.0};  ///< of odometry
+  Travel since_fix_;                                  ///< of odometry
   Eigen::Matrix2d last_test_covariance_{Eigen::Matrix2d::Zero()};
   std::vector<BiasEstimate> bias_estimates_;
 };

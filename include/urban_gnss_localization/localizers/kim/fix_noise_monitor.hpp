@@ -8,19 +8,19 @@
 namespace urban_gnss {
 
 struct FixNoiseParameters {
-  bool adapt_fix_noise{true};            ///< enlarge the declared covariance as the fixes show; false: believe it
-  double fix_noise_horizon{20.0};        ///< s apart at which the errors of two fixes are taken for independent
-  double fix_noise_memory{60.0};         ///< count of fixes that the statistics are averaged over
-  double fix_noise_max_inflation{20.0};  ///< most that a covariance is multiplied by
+  bool adapt_fix_noise{true};
+  double fix_noise_horizon{20.0};
+  double fix_noise_memory{60.0};
+  double fix_noise_max_inflation{20.0};
 
-  template <class V>
-  void visit(V& v) {
-    v("adapt_fix_noise", adapt_fix_noise);
-    v("fix_noise_horizon", fix_noise_horizon, positive());
-    v("fix_noise_memory", fix_noise_memory, at_least(1.0));
-    v("fix_noise_max_inflation", fix_noise_max_inflation, at_least(1.0));
+  void visit(ParameterVisitor& v) {
+    v("adapt_fix_noise", adapt_fix_noise, "enlarge the declared covariance where errors are correlated or larger");
+    v("fix_noise_horizon", fix_noise_horizon, positive(), "",
+      "s apart at which the errors of two fixes are taken for independent");
+    v("fix_noise_memory", fix_noise_memory, at_least(1.0), "", "of fixes averaged over");
+    v("fix_noise_max_inflation", fix_noise_max_inflation, at_least(1.0), "",
+      "most that a covariance (a variance) is multiplied by");
   }
-  void check(std::vector<std::string>&) const {}
 };
 
 /// How much a fix with a coloured error is worth, from a variogram of the fixes against short-horizon odometry: half

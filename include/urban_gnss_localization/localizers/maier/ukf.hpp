@@ -20,29 +20,30 @@ EnumNames<OutlierPolicy> enum_names(OutlierPolicy);
 
 struct UkfParameters {
   OutlierPolicy outliers{OutlierPolicy::kStudentT};
-  double student_dof{1.0};           ///< degrees of freedom of the Student-t distribution; large ones are Gaussian
-  double gate_probability{0.99};     ///< that a good fix is not called an outlier; 1: none is
-  double gate_timeout{5.0};          ///< s of nothing but rejections after which it restarts on the fix
-  double fix_correlation_time{1.0};  ///< s, over which the error of fixes stays the same; 0: independent errors
+  double student_dof{1.0};
+  double gate_probability{0.99};
+  double gate_timeout{5.0};
+  double fix_correlation_time{1.0};
   /// All noise of the odometry is in the motion model, as in the paper.
   OdometryErrorParameters odometry{0.1, 0.03, 2e-4, 0.005, 3e-5, 0.0, 0.0, 0.03};
-  double ukf_alpha{0.5};  ///< spread of the sigma points
-  double ukf_beta{2.0};   ///< 2 is best for Gaussian errors
-  double ukf_kappa{0.0};  ///< secondary spread
+  double ukf_alpha{0.5};
+  double ukf_beta{2.0};
+  double ukf_kappa{0.0};
 
-  template <class V>
-  void visit(V& v) {
-    v("outliers", outliers);
-    v("student_dof", student_dof, positive());
-    v("gate_probability", gate_probability, Range{0.0, 1.0, true});
-    v("gate_timeout", gate_timeout, positive());
-    v("fix_correlation_time", fix_correlation_time, non_negative());
-    odometry.visit(v);
-    v("ukf_alpha", ukf_alpha, between(1e-3, 1.0));
-    v("ukf_beta", ukf_beta, non_negative());
-    v("ukf_kappa", ukf_kappa, non_negative());
+  void visit(ParameterVisitor& v) {
+    v.basic()("outliers", outliers, "fixes that are far off: student_t weighs them down, gate rejects, none uses them");
+    v("student_dof", student_dof, positive(), "degrees", "of freedom of student_t; small is robust, large is Gaussian");
+    v("gate_probability", gate_probability, open_between(0.0, 1.0), "",
+      "probability that a good fix is not called an outlier; 1 calls none");
+    v("gate_timeout", gate_timeout, positive(), "s",
+      "of nothing but rejections after which gate starts anew on the fix");
+    v("fix_correlation_time", fix_correlation_time, non_negative(), "s",
+      "over which the error of fixes stays the same; 0: independent errors");
+    v.group("odometry", odometry, "The odometry's own errors, which the filter estimates.");
+    v("ukf_alpha", ukf_alpha, between(1e-3, 1.0), "", "spread of the sigma points");
+    v("ukf_beta", ukf_beta, non_negative(), "", "weight of the central one in the covariance; 2 for Gaussian errors");
+    v("ukf_kappa", ukf_kappa, non_negative(), "", "secondary spread");
   }
-  void check(std::vector<std::string>&) const {}
 };
 
 /// The unscented Kalman filter of Maier and Kleiner 2010, section III-A: x_t = g(x_{t-1}, u_{t-1}) + noise, eq. (1),

@@ -47,24 +47,25 @@ EnumNames<BiasInput> enum_names(BiasInput);
 
 struct GpsBiasParameters {
   BiasInput bias_input{BiasInput::kResidual};
-  double shadow_sigma{3.0};               ///< m, sigma_s = sigma_c: noise of a fix in the shadow
-  double bias_acceleration_density{0.3};  ///< m/s^2/sqrt(Hz), 0 as printed
-  double bias_rate_sigma{3.0};            ///< m/s, initial standard deviation of the bias's rate
-  double gate_probability{0.99};          ///< probability that a good fix passes the gate; 1 switches it off
-  double gate_timeout{5.0};               ///< s of nothing but rejections after which the filter starts anew (F3)
-  double shadow_probability{0.99};        ///< confidence at which a bias counts as significant
+  double shadow_sigma{3.0};
+  double bias_acceleration_density{0.3};
+  double bias_rate_sigma{3.0};
+  double gate_probability{0.99};
+  double gate_timeout{5.0};
+  double shadow_probability{0.99};
 
-  template <class V>
-  void visit(V& v) {
-    v("bias_input", bias_input);
-    v("shadow_sigma", shadow_sigma, positive());
-    v("bias_acceleration_density", bias_acceleration_density, non_negative());
-    v("bias_rate_sigma", bias_rate_sigma, positive());
-    v("gate_probability", gate_probability, Range{0.0, 1.0, true});
-    v("gate_timeout", gate_timeout, positive());
-    v("shadow_probability", shadow_probability, between(0.5, 0.999999));
+  void visit(ParameterVisitor& v) {
+    v("bias_input", bias_input, "the filter runs on fix minus predicted antenna (residual) or as printed (position)");
+    v("shadow_sigma", shadow_sigma, positive(), "m", "sigma_s = sigma_c: noise of a fix in the shadow, eq. (15), (18)");
+    v("bias_acceleration_density", bias_acceleration_density, non_negative(), "",
+      "m/s^2/sqrt(Hz), how fast the bias may change, eq. (17); 0 as printed");
+    v("bias_rate_sigma", bias_rate_sigma, positive(), "m/s", "standard deviation of the bias's rate at the start");
+    v("gate_probability", gate_probability, open_between(0.0, 1.0), "",
+      "probability that a good fix passes the gate; 1 switches it off");
+    v("gate_timeout", gate_timeout, positive(), "s", "of nothing but rejections after which it starts anew on the fix");
+    v("shadow_probability", shadow_probability, between(0.5, 0.999999), "",
+      "confidence at which the bias counts as significant: in_shadow");
   }
-  void check(std::vector<std::string>&) const {}
 };
 
 /// Tracks the bias from fix to fix: the Kalman filter above with its start, its gate and the way out of a lock-out.
@@ -72,10 +73,10 @@ class BiasTracker {
  public:
   explicit BiasTracker(const GpsBiasParameters& parameters);
 
-  /// Takes one sanitised fix, with the antenna position that the localizer predicted for the fix's stamp from its last
+  /// Takes one validated fix, with the antenna position that the localizer predicted for the fix's stamp from its last
   /// estimate and the odometry since. Requires stamps that ascend.
   const BiasEstimate& process(const LocalFix& fix, const Eigen::Vector2d& predicted_antenna_position,
-                              const FixVerdict& sanitation = {});
+                              const FixVerdict& validation = {});
 
   const BiasEstimate& estimate() const { return estimate_; }
   void reset();

@@ -2,12 +2,12 @@
 
 #include <cstdint>
 
-#include "urban_gnss_localization/localizers/switching/bias_ekf.hpp"
+#include "urban_gnss_localization/gnss/fix_sigma.hpp"
 #include "urban_gnss_localization/localizers/nishida/estimation.hpp"
 #include "urban_gnss_localization/localizers/nishida/fix_likelihood.hpp"
-#include "urban_gnss_localization/localizers/particle_localizer.hpp"
 #include "urban_gnss_localization/localizers/nishida/resampling.hpp"
 #include "urban_gnss_localization/localizers/nishida/sampling.hpp"
+#include "urban_gnss_localization/localizers/particle_localizer.hpp"
 
 namespace urban_gnss {
 
@@ -15,54 +15,50 @@ enum class ParticleFilterMode {
   kLiteral,       ///< the text as printed
   kPaper,         ///< its reading that works
   kConventional,  ///< eq. (46), (47): motion proposal, direct likelihood
-  kSwitching,     ///< no mode of ParticleFilter: SwitchingParticleFilter
 };
 EnumNames<ParticleFilterMode> enum_names(ParticleFilterMode);
 
 /// A choice that the mode makes unless it is made explicitly.
 enum class LikelihoodChoice { kAuto, kPrinted, kSum, kProduct };
 enum class Switch { kAuto, kAlways, kNever };  // YAML 1.1 reads "on" and "off" as booleans
-enum class EstimateMethod { kMean, kHeaviestCluster };
 EnumNames<LikelihoodChoice> enum_names(LikelihoodChoice);
 EnumNames<Switch> enum_names(Switch);
-EnumNames<EstimateMethod> enum_names(EstimateMethod);
 
 struct ParticleFilterParameters {
   ParticleFilterMode mode{ParticleFilterMode::kPaper};
-  int particle_count{1000};                              ///< M
-  double ring_share{0.05};                               ///< share of particles drawn on the ring, eq. (22)
-  LikelihoodChoice likelihood{LikelihoodChoice::kAuto};  ///< auto: printed (literal, conventional) or product (paper)
-  Switch use_gps_heading{Switch::kAuto};  ///< theta_GPS, eq. (12); auto: with the sums, not with the product
-  double gps_heading_sigma{0.1};          ///< rad, sigma_p
-  double ess_threshold{5.0};              ///< resampling below this effective sample size, eq. (39)
+  int particle_count{1000};
+  double ring_share{0.05};
+  LikelihoodChoice likelihood{LikelihoodChoice::kAuto};
+  Switch use_gps_heading{Switch::kAuto};
+  double gps_heading_sigma{0.1};
+  double ess_threshold{5.0};
   ResamplingScheme resampling{ResamplingScheme::kMultinomial};
   EstimateMethod estimate{EstimateMethod::kHeaviestCluster};
-  double cluster_cell{1.0};       ///< m, particles within one to two cells belong together
-  double gate_probability{0.99};  ///< conventional mode: gate on the NIS; 1 switches it off
-  double gate_timeout{5.0};       ///< s of nothing but rejections after which it restarts on the fix
+  double cluster_cell{1.0};
+  double gate_probability{0.99};
+  double gate_timeout{5.0};
   int seed{1};
-  int max_particles{100};          ///< of the mode switching, whose number adapts itself
-  double merge_distance{0.5};      ///< of the mode switching: particles nearer than this become one; large: imm_ekf
-  SwitchingModelParameters model;  ///< of the mode switching; its sigma_b, sigma_s are those of all
+  FixSigmaParameters fix;
 
-  template <class V>
-  void visit(V& v) {
-    v("mode", mode);
-    v("particle_count", particle_count, between(1, 1000000));
-    v("ring_share", ring_share, between(0.0, 1.0));
-    v("likelihood", likelihood);
-    v("use_gps_heading", use_gps_heading);
-    v("gps_heading_sigma", gps_heading_sigma, positive());
-    v("ess_threshold", ess_threshold, non_negative());
-    v("resampling", resampling);
-    v("estimate", estimate);
-    v("cluster_cell", cluster_cell, positive());
-    v("gate_probability", gate_probability, Range{0.0, 1.0, true});
-    v("gate_timeout", gate_timeout, positive());
-    v("seed", seed, any_number());
-    v("max_particles", max_particles, between(1, 10000));
-    v("merge_distance", merge_distance, non_negative());
-    model.visit(v);
+  void visit(ParameterVisitor& v) {
+    v.basic()("mode", mode, "literal: as printed; paper: the reading that works; conventional: eq. (46), (47)");
+    v.include(fix);
+    v("particle_count", particle_count, between(1, 1000000), "", "M");
+    v("ring_share", ring_share, between(0.0, 1.0), "",
+      "0 to 1, share of particles drawn on the ring of radius r-hat, eq. (22)");
+    v("likelihood", likelihood, "eq. (27), (31): printed, sum or product; auto: product in paper, else printed");
+    v("use_gps_heading", use_gps_heading,
+      "theta_GPS, eq. (12): always or never; auto: not with the product likelihood");
+    v("gps_heading_sigma", gps_heading_sigma, positive(), "rad", "sigma_p, eq. (27), (31): noise of theta_GPS");
+    v("ess_threshold", ess_threshold, non_negative(), "",
+      "resampling where the effective sample size, eq. (39), is below this");
+    v("resampling", resampling, "eq. (40): multinomial, or systematic (less variance)");
+    v("estimate", estimate, "eq. (35): mean of all particles, or of the heaviest_cluster");
+    v("cluster_cell", cluster_cell, positive(), "m", "particles within one to two cells belong together");
+    v("gate_probability", gate_probability, open_between(0.0, 1.0), "",
+      "conventional mode: probability that a good fix passes the gate; 1 switches it off");
+    v("gate_timeout", gate_timeout, positive(), "s", "of nothing but rejections after which it starts anew on the fix");
+    v("seed", seed, any_number(), "", "of the random numbers; the same bag and seed give the same estimates");
   }
   void check(std::vector<std::string>& faults) const;
 
@@ -74,7 +70,7 @@ struct ParticleFilterParameters {
 /// The particle filter of Nishida et al., Algorithm 1: sample, weigh, estimate, resample.
 class ParticleFilter : public ParticleLocalizer {
  public:
-  /// Requires parameters without faults, and another mode than kSwitching.
+  /// Requires parameters without faults.
   ParticleFilter(const ParticleFilterParameters& parameters, const MotionParameters& motion);
 
   const char* name() const override { return "particle_filter"; }

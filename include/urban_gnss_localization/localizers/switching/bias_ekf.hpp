@@ -3,16 +3,16 @@
 #include <Eigen/Core>
 #include <cstddef>
 #include <limits>
-#include <optional>
 #include <string>
 #include <vector>
 
-#include "urban_gnss_localization/localizers/switching/bias_modes.hpp"
-#include "urban_gnss_localization/motion/dead_reckoning.hpp"
-#include "urban_gnss_localization/localizers/switching/fix_noise_model.hpp"
-#include "urban_gnss_localization/localizers/localizer.hpp"
-#include "urban_gnss_localization/localizers/switching/velocity_noise.hpp"
+#include "urban_gnss_localization/gnss/fix_sigma.hpp"
 #include "urban_gnss_localization/gnss/range_fix.hpp"
+#include "urban_gnss_localization/localizers/localizer.hpp"
+#include "urban_gnss_localization/localizers/switching/bias_modes.hpp"
+#include "urban_gnss_localization/localizers/switching/fix_noise_model.hpp"
+#include "urban_gnss_localization/localizers/switching/velocity_noise.hpp"
+#include "urban_gnss_localization/motion/dead_reckoning.hpp"
 
 namespace urban_gnss {
 
@@ -24,25 +24,26 @@ struct SwitchingModelParameters {
   VelocityNoiseParameters velocity;
   BiasModeParameters modes;
   OdometryErrorParameters odometry;
-  double yaw_rate_scale_sigma{0.005};  ///< standard deviation of the odometry's relative yaw-rate error, a constant
-  double fix_scale_lag{15.0};          ///< s apart at which fixes are compared with the odometry between them; 0: never
-  /// m per axis, of the error that fixes share for long (orbits, atmosphere), as far as they declare as much. No filter
-  /// sees it: it is added to the covariance of the estimate
+  double yaw_rate_scale_sigma{0.005};
+  double fix_scale_lag{15.0};
   double common_error_sigma{0.7};
 
-  template <class V>
-  void visit(V& v) {
-    fix.visit(v);
-    noise.visit(v);
-    ranges.visit(v);
-    velocity.visit(v);
-    modes.visit(v);
-    odometry.visit(v);
-    v("yaw_rate_scale_sigma", yaw_rate_scale_sigma, non_negative());
-    v("fix_scale_lag", fix_scale_lag, non_negative());
-    v("common_error_sigma", common_error_sigma, non_negative());
+  void visit(ParameterVisitor& v) {
+    v.include(fix);
+    v.group("fix_noise", noise, "What the covariance is worth that a receiver declares.");
+    v.group("ranges", ranges,
+            "The ranges of a fix (gps/satellites): it is solved anew, each range in line of sight or reflected.");
+    v.group("velocity_noise", velocity, "What the velocity of a receiver (gps/velocity) is worth.");
+    v.group("bias", modes,
+            "The bias of a fix: it is received directly, or has a bias that changes slowly, fast, or at once.");
+    v.group("odometry", odometry, "The odometry's own errors, which the filter estimates.");
+    v("yaw_rate_scale_sigma", yaw_rate_scale_sigma, non_negative(), "",
+      "standard deviation of the odometry's relative yaw-rate error, a constant");
+    v("fix_scale_lag", fix_scale_lag, non_negative(), "s",
+      "between the fixes that are compared with the odometry between them; 0: none are");
+    v("common_error_sigma", common_error_sigma, non_negative(), "m per axis",
+      "error that fixes share for long, as far as they declare as much");
   }
-  void check(std::vector<std::string>& faults) const { ranges.check(faults); }
 };
 
 /// Order of the states: pose and odometry errors (kErrorStates), relative error of the yaw rate (1), bias b_x, b_y (m).
@@ -120,55 +121,5 @@ BiasEkfUpdate take_fix(BiasGaussian& state, BiasMode mode, const FixMeasurement&
 /// yaw and speed scale. The likelihood is but for a constant.
 BiasEkfUpdate take_velocity(BiasGaussian& state, const VelocityMeasurement& measured, const Eigen::Matrix2d& noise,
                             double student_dof);
-
-/// What the filters learn of the receiver beside the state, and remember of the time.
-class ReceiverModel {
- public:
-  /// Requires parameters without faults.
-  explicit ReceiverModel(const SwitchingModelParameters& parameters);
-
-  /// Forgets everything.
-  void reset();
-  void move(const Twist2& twist, double duration_s);
-
-  /// s >= 0 since the last fix; since the start where there was none.
-  double elapsed_s(double time_s) const;
-  /// The fix as far as it is believed: what its ranges say beside the state `before` it (range_fix()) where it has
-  /// them, else with its covariance by FixNoiseModel::believed(). Once a fix, before the others of this class.
-  FixMeasurement believed(const FixMeasurement& fix, const BiasGaussian& before);
-  /// Whether the last fix was what its ranges say.
-  bool of_ranges() const { return of_ranges_; }
-  /// m, of a range in line of sight, as learnt.
-  double range_sigma_m() const;
-  FixNoise fix_noise(double time_s) const {
-    if (of_ranges_) return {1.0, range_noise_.correlation_inflation(time_s), true};
-    return {noise_.scale(), noise_.correlation_inflation(time_s), false};
-  }
-  /// Prior odds of a bias of the fix, against those of the parameters: bias_odds of mode_transition().
-  double bias_odds() const { return of_ranges_ ? parameters_.ranges.range_bias_odds : 1.0; }
-  /// A fix was taken, with a share `exceeding` of its NIS beyond the median.
-  void learn_fix(double time_s, double exceeding);
-  /// Lets the noise model see the fix beside the odometry alone; `before` and `after` it, all modes together.
-  void compare_with_odometry(const FixMeasurement& fix, const BiasGaussian& before, const BiasGaussian& after);
-
-  double velocity_scale() const { return velocity_scale_.value(); }
-  /// A velocity was taken; `before` and `after` it, all modes together.
-  void learn_velocity(double exceeding, const BiasGaussian& before, const BiasGaussian& after);
-
-  /// m^2 per axis, of the error that all fixes share.
-  double common_variance_m2() const { return common_variance_m2_; }
-
- private:
-  SwitchingModelParameters parameters_;
-  FixNoiseModel noise_;
-  FixNoiseModel range_noise_;
-  FreeSignalLevel free_signals_;
-  bool of_ranges_{false};  ///< the last fix
-  LearntScale velocity_scale_;
-  std::optional<double> last_fix_s_;
-  double moved_s_{0.0};                                   ///< of odometry since the start
-  Eigen::Vector2d corrections_{Eigen::Vector2d::Zero()};  ///< m, what fixes and velocities have moved the position by
-  double common_variance_m2_{0.0};
-};
 
 }  // namespace urban_gnss

@@ -10,26 +10,6 @@
 
 namespace urban_gnss {
 
-/// What is known of a fix's noise without and with a bias.
-struct FixSigmaParameters {
-  bool use_fix_covariance{true};  ///< each fix's own covariance in place of direct_sigma
-  double direct_sigma{3.0};       ///< m per axis, sigma_b, in direct reception
-  double shadow_sigma{3.0};       ///< m per axis, sigma_s, in the shadow, about its bias
-
-  template <class V>
-  void visit(V& v) {
-    v("use_fix_covariance", use_fix_covariance);
-    v("direct_sigma", direct_sigma, positive());
-    v("shadow_sigma", shadow_sigma, positive());
-  }
-  void check(std::vector<std::string>&) const {}
-
-  /// Covariance (m^2) of a fix that declares `declared`, in direct reception.
-  Eigen::Matrix2d direct_covariance(const Eigen::Matrix2d& declared) const;
-  /// The same about its bias, in the shadow: larger by the ratio of the sigmas where the fix's own covariance is used.
-  Eigen::Matrix2d shadow_covariance(const Eigen::Matrix2d& declared) const;
-};
-
 /// How a fix came about. What stands before kJump can last; a jump is an entry into kSlow.
 enum class BiasMode : std::size_t {
   kDirect,  ///< S: no bias
@@ -46,37 +26,40 @@ constexpr BiasMode lasting(BiasMode mode) { return mode == BiasMode::kJump ? Bia
 
 /// The model of a switching bias. Times are means of exponentially distributed ones.
 struct BiasModeParameters {
-  double direct_time{1000.0};    ///< s, tau_S: direct reception until the next bias
-  double slow_bias_time{20.0};   ///< s, tau_L: a slow bias until it changes fast or jumps
-  double fast_bias_time{1.0};    ///< s, tau_F: a fast changing bias until it ends, becomes slow or jumps
-  double bias_end_time{5.0};     ///< s, tau_LS: a slow bias until it ends
-  double jump_share{0.9};        ///< p_J: of the onsets and changes, those that come at once
-  double slow_bias_walk{0.3};    ///< m/sqrt(s) per axis, sqrt(q_s)
-  double fast_bias_walk{1.0};    ///< m/sqrt(s) per axis, sqrt(q_f)
-  double jump_sigma{8.0};        ///< m per axis, sigma_J, of a bias that came at once
-  double bias_fade_time{20.0};   ///< s, after which a bias is again like one that has just come; 0: it never forgets
-  double onset_sigma{0.5};       ///< m per axis, of a bias that begins without a jump
-  double student_dof{4.0};       ///< degrees of freedom of the noise in direct reception; large ones are Gaussian
-  double outlier_share{0.01};    ///< of the fixes, those that say nothing
-  double outlier_radius{200.0};  ///< m, within which such a fix is anywhere
+  double direct_time{1000.0};
+  double slow_bias_time{20.0};
+  double fast_bias_time{1.0};
+  double bias_end_time{5.0};
+  double jump_share{0.9};
+  double slow_bias_walk{0.3};
+  double fast_bias_walk{1.0};
+  double jump_sigma{8.0};
+  double bias_fade_time{20.0};
+  double onset_sigma{0.5};
+  double student_dof{4.0};
+  double outlier_share{0.01};
+  double outlier_radius{200.0};
 
-  template <class V>
-  void visit(V& v) {
-    v("direct_time", direct_time, positive());
-    v("slow_bias_time", slow_bias_time, positive());
-    v("fast_bias_time", fast_bias_time, positive());
-    v("bias_end_time", bias_end_time, positive());
-    v("jump_share", jump_share, between(0.0, 1.0));
-    v("slow_bias_walk", slow_bias_walk, non_negative());
-    v("fast_bias_walk", fast_bias_walk, non_negative());
-    v("jump_sigma", jump_sigma, positive());
-    v("bias_fade_time", bias_fade_time, non_negative());
-    v("onset_sigma", onset_sigma, non_negative());
-    v("student_dof", student_dof, positive());
-    v("outlier_share", outlier_share, between(0.0, 0.5));
-    v("outlier_radius", outlier_radius, positive());
+  void visit(ParameterVisitor& v) {
+    v("direct_time", direct_time, positive(), "s", "tau_S, mean time of direct reception until the next bias");
+    v("slow_bias_time", slow_bias_time, positive(), "s",
+      "tau_L, mean time of a slow bias until it changes fast or jumps");
+    v("fast_bias_time", fast_bias_time, positive(), "s",
+      "tau_F, mean time of a fast changing bias until it ends, is slow or jumps");
+    v("bias_end_time", bias_end_time, positive(), "s", "tau_LS, mean time of a slow bias until it ends");
+    v("jump_share", jump_share, between(0.0, 1.0), "",
+      "0 to 1, p_J, share of the onsets and changes that come at once");
+    v("slow_bias_walk", slow_bias_walk, non_negative(), "m/sqrt(s) per axis", "root of q_s");
+    v("fast_bias_walk", fast_bias_walk, non_negative(), "m/sqrt(s) per axis", "root of q_f");
+    v("jump_sigma", jump_sigma, positive(), "m per axis", "sigma_J, of a bias that came at once");
+    v("bias_fade_time", bias_fade_time, non_negative(), "s",
+      "after which a bias is again like one that has just come; 0: it never forgets");
+    v("onset_sigma", onset_sigma, non_negative(), "m per axis", "of a bias that begins without a jump");
+    v("student_dof", student_dof, positive(), "degrees",
+      "of freedom of the noise in direct reception; large ones are Gaussian");
+    v("outlier_share", outlier_share, between(0.0, 0.5), "", "0 to 0.5, share of the fixes that say nothing");
+    v("outlier_radius", outlier_radius, positive(), "m", "within which such a fix is anywhere");
   }
-  void check(std::vector<std::string>&) const {}
 
   /// Share of the fixes times the density of what is anywhere: a fix's likelihood is at least this (1/m^2).
   double outlier_density() const;

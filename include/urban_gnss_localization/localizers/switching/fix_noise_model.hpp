@@ -7,30 +7,31 @@
 
 #include "urban_gnss_localization/common/parameters.hpp"
 #include "urban_gnss_localization/localizers/switching/learnt_scale.hpp"
-#include "urban_gnss_localization/motion/motion_model.hpp"
+#include "urban_gnss_localization/motion/standstill.hpp"
 
 namespace urban_gnss {
 
 /// How a receiver's declared covariance is related to the errors of its fixes.
 struct FixNoiseModelParameters {
-  /// 1, by how much a fix changes the logarithm of the factor on the declared covariance; 0: the factor stays 1
   double fix_scale_rate{0.03};
-  double first_fix_scale{2.0};           ///< factor on the declared covariance before anything is learnt
-  double fix_covariance_weight{0.5};     ///< 0 to 1, how far the declared covariance's ups and downs are believed
-  double fix_scale_limit{15.0};          ///< factor by which declared standard deviations may be wrong, either way
-  double fix_correlation_time{3.0};      ///< s, over which the error of a fix stays the same; 0: independent errors
-  double parked_correlation_time{30.0};  ///< s, the same while the robot stands: reflections change little then (F34)
+  double first_fix_scale{2.0};
+  double fix_covariance_weight{0.5};
+  double fix_scale_limit{15.0};
+  double fix_correlation_time{3.0};
+  double parked_correlation_time{30.0};
 
-  template <class V>
-  void visit(V& v) {
-    v("fix_scale_rate", fix_scale_rate, between(0.0, 1.0));
-    v("first_fix_scale", first_fix_scale, positive());
-    v("fix_covariance_weight", fix_covariance_weight, between(0.0, 1.0));
-    v("fix_scale_limit", fix_scale_limit, at_least(1.0));
-    v("fix_correlation_time", fix_correlation_time, non_negative());
-    v("parked_correlation_time", parked_correlation_time, non_negative());
+  void visit(ParameterVisitor& v) {
+    v("fix_scale_rate", fix_scale_rate, between(0.0, 1.0), "",
+      "change of the log of the factor on declared covariances with a fix; 0: they are right");
+    v("first_fix_scale", first_fix_scale, positive(), "", "that factor (on the variance) before anything is learnt");
+    v("fix_covariance_weight", fix_covariance_weight, between(0.0, 1.0), "",
+      "0 to 1, how far the ups and downs of declared covariances are believed");
+    v("fix_scale_limit", fix_scale_limit, at_least(1.0), "",
+      "factor by which declared standard deviations may be wrong, either way");
+    v("fix_correlation_time", fix_correlation_time, non_negative(), "s",
+      "over which the error of fixes stays the same; 0: independent errors");
+    v("parked_correlation_time", parked_correlation_time, non_negative(), "s", "the same while the robot stands");
   }
-  void check(std::vector<std::string>&) const {}
 };
 
 /// A fix beside what was dead-reckoned.
@@ -65,7 +66,7 @@ class FixNoiseModel {
   /// The next fix declares `declared` (m^2, positive definite): as far as its ups and downs are believed. Its size is
   /// drawn towards the geometric mean of those declared lately, by the power 1 - fix_covariance_weight, at most by a
   /// factor of 4.
-  Eigen::Matrix2d believed(const Eigen::Matrix2d& declared);
+  Eigen::Matrix2d effective_covariance(const Eigen::Matrix2d& declared);
   /// Factor on the covariance of a fix at `time_s` by which correlation lowers its worth, at least 1.
   double correlation_inflation(double time_s) const;
 
@@ -89,8 +90,7 @@ class FixNoiseModel {
   std::optional<LearntScale> lagged_scale_;
   std::deque<DeadReckonedFix> fixes_;
   std::optional<double> last_s_;
-  double moved_m_{0.0};
-  double elapsed_s_{0.0};
+  Travel since_fix_;
 };
 
 }  // namespace urban_gnss

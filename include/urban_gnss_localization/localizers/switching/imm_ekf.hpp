@@ -3,7 +3,7 @@
 #include <Eigen/Core>
 #include <array>
 
-#include "urban_gnss_localization/localizers/switching/bias_ekf.hpp"
+#include "urban_gnss_localization/localizers/switching/fix_statistics.hpp"
 
 namespace urban_gnss {
 
@@ -55,7 +55,7 @@ class ImmEkf : public Localizer {
   ImmEkfParameters parameters_;
   MotionParameters motion_;
   double nis_threshold_;
-  ReceiverModel receiver_;
+  FixStatistics statistics_;
   std::array<Gaussian, kLastingModes> filters_;
   ModeProbabilities probability_{ModeProbabilities::Zero()};
 };

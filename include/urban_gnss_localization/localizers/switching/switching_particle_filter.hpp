@@ -4,10 +4,10 @@
 #include <memory>
 #include <vector>
 
-#include "urban_gnss_localization/localizers/switching/bias_ekf.hpp"
-#include "urban_gnss_localization/localizers/switching/mixture_reduction.hpp"
 #include "urban_gnss_localization/localizers/nishida/particle_filter.hpp"
 #include "urban_gnss_localization/localizers/particle_localizer.hpp"
+#include "urban_gnss_localization/localizers/switching/fix_statistics.hpp"
+#include "urban_gnss_localization/localizers/switching/mixture_reduction.hpp"
 
 namespace urban_gnss {
 
@@ -22,7 +22,7 @@ namespace urban_gnss {
 /// fixes contradict each other.
 ///
 /// The estimate is that of the heaviest cluster: of particles whose positions are within three standard deviations of
-/// the heaviest of them, F32. Its covariance is that of all particles about it.
+/// the heaviest of them. Its covariance is that of all particles about it.
 ///
 /// Input that is not finite changes nothing.
 class SwitchingParticleFilter : public ParticleLocalizer {
@@ -72,7 +72,7 @@ class SwitchingParticleFilter : public ParticleLocalizer {
   double nis_threshold_;
   std::size_t most_;
   RandomEngine engine_;
-  ReceiverModel receiver_;
+  FixStatistics statistics_;
   MixtureReducer reducer_;
   std::vector<BiasHypothesis> hypotheses_;
   std::vector<BiasHypothesis> next_;

@@ -12,36 +12,32 @@
 namespace urban_gnss {
 
 /// What is believed of a receiver's own covariance, and how far from the datum a fix may lie.
-struct FixSanitationParameters {
-  /// m, standard deviation per horizontal axis where a fix declares no covariance that can be used
+struct FixValidationParameters {
   double fix_sigma_default{4.0};
-  /// m, smallest standard deviation that is believed; receivers declare millimetres, or degrees squared
   double fix_sigma_floor{0.3};
-  /// m, largest standard deviation that is kept; beyond it a fix says nothing
   double fix_sigma_ceiling{200.0};
-  /// factor on the declared covariance (a variance, not a standard deviation), before floor and ceiling
   double fix_covariance_scale{1.0};
-  /// m, a fix farther from the datum is rejected
   double max_distance_from_datum{100000.0};
 
-  template <class V>
-  void visit(V& v) {
-    v("fix_sigma_default", fix_sigma_default, positive());
-    v("fix_sigma_floor", fix_sigma_floor, positive());
-    v("fix_sigma_ceiling", fix_sigma_ceiling, positive());
-    v("fix_covariance_scale", fix_covariance_scale, positive());
-    v("max_distance_from_datum", max_distance_from_datum, positive());
+  void visit(ParameterVisitor& v) {
+    v.basic()("fix_sigma_default", fix_sigma_default, positive(), "",
+              "m per axis where a fix declares no covariance that can be used");
+    v("fix_sigma_floor", fix_sigma_floor, positive(), "m per axis", "least that is believed");
+    v("fix_sigma_ceiling", fix_sigma_ceiling, positive(), "m per axis", "most that is kept");
+    v("fix_covariance_scale", fix_covariance_scale, positive(), "",
+      "factor on the declared covariance (a variance), before floor and ceiling");
+    v("max_distance_from_datum", max_distance_from_datum, positive(), "m", "a fix farther away is rejected");
   }
   void check(std::vector<std::string>& faults) const;
 };
 
-/// A fix after sanitation. Where is_rejected(verdict.decision), `fix` holds nothing but the stamp.
-struct SanitizedFix {
+/// A fix after validation. Where is_rejected(verdict.decision), `fix` holds nothing but the stamp.
+struct ValidatedFix {
   LocalFix fix;
   FixVerdict verdict;
 };
 
-/// The part of sanitation that needs neither datum nor history: in this order, the receiver has a fix (else
+/// The part of validation that needs neither datum nor history: in this order, the receiver has a fix (else
 /// kRejectedStatus); latitude and longitude are finite (else kRejectedNonFinite); the stamp is not negative, they name
 /// a place, and are not both exactly 0, which is what receivers report before they know (else kRejectedOutOfRange).
 bool is_usable_position(const RawFix& raw);
@@ -60,7 +56,7 @@ bool is_usable_position(const RawFix& raw);
 /// was used, else kAccepted; verdict.covariance_clamped tells of all three.
 ///
 /// `last_stamp` is the stamp of the fix handled last, nothing at the start. Requires parameters without faults.
-SanitizedFix sanitize_fix(const RawFix& raw, const LocalFrame& frame, std::optional<Stamp> last_stamp,
-                          const FixSanitationParameters& parameters);
+ValidatedFix validate_fix(const RawFix& raw, const LocalFrame& frame, std::optional<Stamp> last_stamp,
+                          const FixValidationParameters& parameters);
 
 }  // namespace urban_gnss

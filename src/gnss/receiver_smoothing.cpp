@@ -1,11 +1,11 @@
-#include "urban_gnss_localization/gnss/receiver_memory.hpp"
+#include "urban_gnss_localization/gnss/receiver_smoothing.hpp"
 
 #include <Eigen/Eigenvalues>
 #include <cmath>
 
 namespace urban_gnss {
 
-Eigen::Matrix2d ReceiverMemory::add(Stamp stamp, const Eigen::Vector2d& mean, const Eigen::Matrix2d& covariance) {
+Eigen::Matrix2d ReceiverSmoothing::add(Stamp stamp, const Eigen::Vector2d& mean, const Eigen::Matrix2d& covariance) {
   const double interval_s = last_ ? to_seconds(stamp - *last_) : -1.0;
   const bool goes_on =
       interval_s > 0.0 && interval_s <= parameters_.receiver_coasting_time && parameters_.receiver_smoothing_time > 0.0;

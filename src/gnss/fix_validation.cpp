@@ -1,4 +1,4 @@
-#include "urban_gnss_localization/gnss/fix_sanitation.hpp"
+#include "urban_gnss_localization/gnss/fix_validation.hpp"
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
@@ -78,7 +78,7 @@ std::optional<HorizontalCovariance> declared_covariance(const RawFix& raw) {
   return HorizontalCovariance{sigma, correlation};
 }
 
-Eigen::Matrix2d clamp_covariance(HorizontalCovariance declared, const FixSanitationParameters& parameters,
+Eigen::Matrix2d clamp_covariance(HorizontalCovariance declared, const FixValidationParameters& parameters,
                                  FixVerdict& verdict) {
   const double floor = parameters.fix_sigma_floor;
   const double ceiling = parameters.fix_sigma_ceiling;
@@ -108,7 +108,7 @@ Eigen::Matrix2d clamp_covariance(HorizontalCovariance declared, const FixSanitat
   return 0.5 * (product + product.transpose());
 }
 
-Eigen::Matrix2d usable_covariance(const RawFix& raw, const FixSanitationParameters& parameters, FixVerdict& verdict) {
+Eigen::Matrix2d usable_covariance(const RawFix& raw, const FixValidationParameters& parameters, FixVerdict& verdict) {
   const bool is_unknown = raw.covariance_type == CovarianceType::kUnknown;
   const auto declared = is_unknown ? std::nullopt : declared_covariance(raw);
   if (declared) return clamp_covariance(*declared, parameters, verdict);
@@ -122,7 +122,7 @@ Eigen::Matrix2d usable_covariance(const RawFix& raw, const FixSanitationParamete
 
 }  // namespace
 
-void FixSanitationParameters::check(std::vector<std::string>& faults) const {
+void FixValidationParameters::check(std::vector<std::string>& faults) const {
   if (!(fix_sigma_floor <= fix_sigma_ceiling)) {
     faults.push_back("fix_sigma_floor = " + number(fix_sigma_floor) +
                      ": must be at most fix_sigma_ceiling = " + number(fix_sigma_ceiling));
@@ -134,9 +134,9 @@ void FixSanitationParameters::check(std::vector<std::string>& faults) const {
 
 bool is_usable_position(const RawFix& raw) { return !reject_position(raw); }
 
-SanitizedFix sanitize_fix(const RawFix& raw, const LocalFrame& frame, std::optional<Stamp> last_stamp,
-                          const FixSanitationParameters& parameters) {
-  SanitizedFix result;
+ValidatedFix validate_fix(const RawFix& raw, const LocalFrame& frame, std::optional<Stamp> last_stamp,
+                          const FixValidationParameters& parameters) {
+  ValidatedFix result;
   result.fix.stamp = raw.stamp;
   FixVerdict& verdict = result.verdict;
   verdict.stamp = raw.stamp;

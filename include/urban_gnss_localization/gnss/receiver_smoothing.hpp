@@ -10,16 +10,16 @@
 
 namespace urban_gnss {
 
-struct ReceiverMemoryParameters {
-  double receiver_smoothing_time{8.0};  ///< s, over which the receiver smooths its solutions; 0: not at all
-  double receiver_coasting_time{3.0};   ///< s without a solution after which it starts anew
+struct ReceiverSmoothingParameters {
+  double receiver_smoothing_time{8.0};
+  double receiver_coasting_time{3.0};
 
-  template <class V>
-  void visit(V& v) {
-    v("receiver_smoothing_time", receiver_smoothing_time, non_negative());
-    v("receiver_coasting_time", receiver_coasting_time, non_negative());
+  void visit(ParameterVisitor& v) {
+    v("receiver_smoothing_time", receiver_smoothing_time, non_negative(), "s",
+      "over which the receiver smooths: so long an error outlasts its cause");
+    v("receiver_coasting_time", receiver_coasting_time, non_negative(), "s",
+      "without a solution after which it starts anew");
   }
-  void check(std::vector<std::string>&) const {}
 };
 
 /// What is left in a receiver's fix of the errors before it; the soft form of the recovery in Algorithm 3 of Maier and
@@ -30,10 +30,10 @@ struct ReceiverMemoryParameters {
 /// with one z for all times: errors of reflections stay for some time, and where they do not, this is an upper bound
 /// (Minkowski's inequality, in every direction). So the low-passes B of b and S of V^(1/2), the symmetric root, give
 /// the second moment S S + B B^T. White errors are smoothed to less: sigma_ure is meant to be that of a smoothed fix.
-class ReceiverMemory {
+class ReceiverSmoothing {
  public:
   /// Requires parameters without faults.
-  explicit ReceiverMemory(const ReceiverMemoryParameters& parameters) : parameters_(parameters) {}
+  explicit ReceiverSmoothing(const ReceiverSmoothingParameters& parameters) : parameters_(parameters) {}
 
   /// Second moment of the error of the fix at `stamp`, m^2, whose solution alone has this mean error (m) and covariance
   /// (m^2, positive semidefinite). Starts anew after receiver_coasting_time without a solution, and where the stamp is
@@ -43,7 +43,7 @@ class ReceiverMemory {
   void reset() { last_.reset(); }
 
  private:
-  ReceiverMemoryParameters parameters_;
+  ReceiverSmoothingParameters parameters_;
   std::optional<Stamp> last_;
   // Where there is a last stamp:
   Eigen::Vector2d mean_{Eigen::Vector2d::Zero()};

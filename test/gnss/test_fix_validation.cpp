@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "urban_gnss_localization/gnss/fix_sanitation.hpp"
+#include "urban_gnss_localization/gnss/fix_validation.hpp"
 
 namespace urban_gnss {
 namespace {
@@ -37,25 +37,25 @@ RawFix fix_with_covariance(double east, double north, double mixed) {
   return raw;
 }
 
-SanitizedFix sanitize(const RawFix& raw, const FixSanitationParameters& parameters = {},
+ValidatedFix validate(const RawFix& raw, const FixValidationParameters& parameters = {},
                       std::optional<Stamp> last_stamp = std::nullopt) {
-  return sanitize_fix(raw, LocalFrame(kDatum), last_stamp, parameters);
+  return validate_fix(raw, LocalFrame(kDatum), last_stamp, parameters);
 }
 
 FixDecision decision_at(double latitude, double longitude) {
   RawFix raw = good_fix();
   raw.position.latitude_deg = latitude;
   raw.position.longitude_deg = longitude;
-  return sanitize(raw).verdict.decision;
+  return validate(raw).verdict.decision;
 }
 
 Eigen::Matrix2d isotropic(double sigma) { return sigma * sigma * Eigen::Matrix2d::Identity(); }
 
 bool is_near(const Eigen::Matrix2d& a, const Eigen::Matrix2d& b) { return a.isApprox(b, 1e-9); }
 
-TEST(FixSanitation, GoodFixIsAcceptedAsDeclared) {
+TEST(FixValidation, GoodFixIsAcceptedAsDeclared) {
   const RawFix raw = good_fix();
-  const SanitizedFix result = sanitize(raw);
+  const ValidatedFix result = validate(raw);
   EXPECT_EQ(result.verdict.decision, FixDecision::kAccepted) << result.verdict.reason;
   EXPECT_FALSE(result.verdict.covariance_clamped);
   EXPECT_EQ(result.verdict.reason, "");
@@ -66,22 +66,22 @@ TEST(FixSanitation, GoodFixIsAcceptedAsDeclared) {
   EXPECT_GT(result.fix.position.minCoeff(), 90.0);
 }
 
-TEST(FixSanitation, NoFixIsRejectedByStatusBeforeAnythingElse) {
+TEST(FixValidation, NoFixIsRejectedByStatusBeforeAnythingElse) {
   RawFix raw = good_fix();
   raw.has_fix = false;
   raw.position.latitude_deg = kNaN;
-  EXPECT_EQ(sanitize(raw).verdict.decision, FixDecision::kRejectedStatus);
+  EXPECT_EQ(validate(raw).verdict.decision, FixDecision::kRejectedStatus);
   EXPECT_FALSE(is_usable_position(raw));
 }
 
-TEST(FixSanitation, NonFiniteCoordinatesAreRejectedF25) {
+TEST(FixValidation, NonFiniteCoordinatesAreRejected) {
   for (const double value : {kNaN, kInfinity, -kInfinity}) {
     EXPECT_EQ(decision_at(value, 130.84), FixDecision::kRejectedNonFinite);
     EXPECT_EQ(decision_at(33.89, value), FixDecision::kRejectedNonFinite);
   }
 }
 
-TEST(FixSanitation, NoSuchPlaceIsRejected) {
+TEST(FixValidation, NoSuchPlaceIsRejected) {
   EXPECT_EQ(decision_at(90.001, 130.84), FixDecision::kRejectedOutOfRange);
   EXPECT_EQ(decision_at(-91.0, 130.84), FixDecision::kRejectedOutOfRange);
   EXPECT_EQ(decision_at(33.89, 180.001), FixDecision::kRejectedOutOfRange);
@@ -89,96 +89,96 @@ TEST(FixSanitation, NoSuchPlaceIsRejected) {
   RawFix raw = good_fix();
   raw.position.longitude_deg -= 360.0;  // the same meridian, but no receiver says it so
   EXPECT_FALSE(is_usable_position(raw));
-  EXPECT_EQ(sanitize(raw).verdict.decision, FixDecision::kRejectedOutOfRange);
+  EXPECT_EQ(validate(raw).verdict.decision, FixDecision::kRejectedOutOfRange);
 }
 
-TEST(FixSanitation, LatitudeAndLongitudeBothZeroAreRejectedF15) {
-  FixSanitationParameters parameters;
+TEST(FixValidation, LatitudeAndLongitudeBothZeroAreRejected) {
+  FixValidationParameters parameters;
   RawFix raw = good_fix();
   raw.position = {0.0, -0.0, 10.0};
   const LocalFrame gulf_of_guinea({0.0001, 0.0001, 0.0});  // the distance from the datum is not what rejects it
-  const auto result = sanitize_fix(raw, gulf_of_guinea, std::nullopt, parameters);
+  const auto result = validate_fix(raw, gulf_of_guinea, std::nullopt, parameters);
   EXPECT_EQ(result.verdict.decision, FixDecision::kRejectedOutOfRange);
   raw.position.longitude_deg = 1e-5;
-  EXPECT_EQ(sanitize_fix(raw, gulf_of_guinea, std::nullopt, parameters).verdict.decision, FixDecision::kAccepted);
+  EXPECT_EQ(validate_fix(raw, gulf_of_guinea, std::nullopt, parameters).verdict.decision, FixDecision::kAccepted);
 }
 
-TEST(FixSanitation, LongitudeOf180IsAPlace) {
+TEST(FixValidation, LongitudeOf180IsAPlace) {
   RawFix raw = good_fix();
   for (const double longitude : {180.0, -180.0}) {
     raw.position = {-16.8, longitude, 0.0};
-    const auto result = sanitize_fix(raw, LocalFrame({-16.8, 179.9999, 0.0}), std::nullopt, {});
+    const auto result = validate_fix(raw, LocalFrame({-16.8, 179.9999, 0.0}), std::nullopt, {});
     EXPECT_EQ(result.verdict.decision, FixDecision::kAccepted) << result.verdict.reason;
     EXPECT_NEAR(result.fix.position.x(), 10.66, 0.01);
   }
 }
 
-TEST(FixSanitation, FarFromTheDatumIsRejectedEvenAtTheAntipode) {
-  FixSanitationParameters parameters;
+TEST(FixValidation, FarFromTheDatumIsRejectedEvenAtTheAntipode) {
+  FixValidationParameters parameters;
   parameters.max_distance_from_datum = 1000.0;
   RawFix raw = good_fix();
   raw.position.latitude_deg = kDatum.latitude_deg + 0.008;  // 887 m
-  EXPECT_EQ(sanitize(raw, parameters).verdict.decision, FixDecision::kAccepted);
+  EXPECT_EQ(validate(raw, parameters).verdict.decision, FixDecision::kAccepted);
   raw.position.latitude_deg = kDatum.latitude_deg + 0.010;  // 1109 m
-  EXPECT_EQ(sanitize(raw, parameters).verdict.decision, FixDecision::kRejectedOutOfRange);
+  EXPECT_EQ(validate(raw, parameters).verdict.decision, FixDecision::kRejectedOutOfRange);
   EXPECT_EQ(decision_at(-kDatum.latitude_deg, kDatum.longitude_deg - 180.0), FixDecision::kRejectedOutOfRange);
 }
 
-TEST(FixSanitation, HeightIsNoDistance) {
-  FixSanitationParameters parameters;
+TEST(FixValidation, HeightIsNoDistance) {
+  FixValidationParameters parameters;
   parameters.max_distance_from_datum = 1000.0;
   RawFix raw = good_fix();
   raw.position.altitude_m = 2500.0;  // the datum's height was left at 30 m
-  EXPECT_EQ(sanitize(raw, parameters).verdict.decision, FixDecision::kAccepted);
+  EXPECT_EQ(validate(raw, parameters).verdict.decision, FixDecision::kAccepted);
 }
 
-TEST(FixSanitation, NegativeStampIsRejected) {
+TEST(FixValidation, NegativeStampIsRejected) {
   RawFix raw = good_fix();
   for (const Stamp stamp : {Stamp(-1), Stamp::min()}) {
     raw.stamp = stamp;
-    EXPECT_EQ(sanitize(raw).verdict.decision, FixDecision::kRejectedOutOfRange);
+    EXPECT_EQ(validate(raw).verdict.decision, FixDecision::kRejectedOutOfRange);
   }
   raw.stamp = Stamp(0);
-  EXPECT_EQ(sanitize(raw).verdict.decision, FixDecision::kAccepted);
+  EXPECT_EQ(validate(raw).verdict.decision, FixDecision::kAccepted);
 }
 
-TEST(FixSanitation, StampMustBeNewerThanTheLast) {
+TEST(FixValidation, StampMustBeNewerThanTheLast) {
   const RawFix raw = good_fix();
-  const auto duplicate = sanitize(raw, {}, raw.stamp);
+  const auto duplicate = validate(raw, {}, raw.stamp);
   EXPECT_EQ(duplicate.verdict.decision, FixDecision::kRejectedStale);
   EXPECT_NE(duplicate.verdict.reason.find("duplicate"), std::string::npos);
-  const auto older = sanitize(raw, {}, raw.stamp + from_seconds(0.5));
+  const auto older = validate(raw, {}, raw.stamp + from_seconds(0.5));
   EXPECT_EQ(older.verdict.decision, FixDecision::kRejectedStale);
   EXPECT_EQ(older.verdict.reason, "0.5 s older than the last fix");
-  EXPECT_EQ(sanitize(raw, {}, raw.stamp - Stamp(1)).verdict.decision, FixDecision::kAccepted);
+  EXPECT_EQ(validate(raw, {}, raw.stamp - Stamp(1)).verdict.decision, FixDecision::kAccepted);
 }
 
-TEST(FixSanitation, UnusableAltitudeDoesNotDropTheFixF15) {
+TEST(FixValidation, UnusableAltitudeDoesNotDropTheFix) {
   RawFix raw = good_fix();
   raw.position.altitude_m = kDatum.altitude_m;
-  const Eigen::Vector2d expected = sanitize(raw).fix.position;
+  const Eigen::Vector2d expected = validate(raw).fix.position;
   for (const double altitude : {kNaN, kInfinity, -kInfinity, kMax, -1e9}) {
     raw.position.altitude_m = altitude;
-    const auto result = sanitize(raw);
+    const auto result = validate(raw);
     EXPECT_EQ(result.verdict.decision, FixDecision::kAccepted);
     EXPECT_EQ(result.fix.position, expected);
     EXPECT_NE(result.verdict.reason.find("altitude"), std::string::npos);
   }
 }
 
-TEST(FixSanitation, RejectedFixHoldsNothingButTheStamp) {
+TEST(FixValidation, RejectedFixHoldsNothingButTheStamp) {
   RawFix raw = good_fix();
   raw.position.latitude_deg = kNaN;
   raw.covariance.setConstant(kNaN);
-  const auto result = sanitize(raw);
+  const auto result = validate(raw);
   EXPECT_EQ(result.fix.stamp, raw.stamp);
   EXPECT_EQ(result.fix.position, Eigen::Vector2d::Zero());
   EXPECT_EQ(result.fix.covariance, Eigen::Matrix2d::Identity());
   EXPECT_TRUE(is_rejected(result.verdict.decision));
 }
 
-TEST(FixSanitation, CovarianceThatCannotBeUsedIsTheDefaultF12) {
-  FixSanitationParameters parameters;
+TEST(FixValidation, CovarianceThatCannotBeUsedIsTheDefault) {
+  FixValidationParameters parameters;
   parameters.fix_sigma_default = 7.0;
   RawFix unknown = good_fix();
   unknown.covariance_type = CovarianceType::kUnknown;
@@ -194,7 +194,7 @@ TEST(FixSanitation, CovarianceThatCannotBeUsedIsTheDefaultF12) {
                              fix_with_covariance(4.0, 4.0, -4.0),
                              fix_with_covariance(1.0, 1.0, kMax)};
   for (const RawFix& raw : unusable) {
-    const auto result = sanitize(raw, parameters);
+    const auto result = validate(raw, parameters);
     EXPECT_EQ(result.verdict.decision, FixDecision::kInflated) << raw.covariance;
     EXPECT_TRUE(result.verdict.covariance_clamped);
     EXPECT_NE(result.verdict.reason.find("default sigma 7 m"), std::string::npos) << result.verdict.reason;
@@ -202,16 +202,16 @@ TEST(FixSanitation, CovarianceThatCannotBeUsedIsTheDefaultF12) {
   }
 }
 
-TEST(FixSanitation, VerticalCovarianceDoesNotMatter) {
+TEST(FixValidation, VerticalCovarianceDoesNotMatter) {
   RawFix raw = good_fix();
   raw.covariance.row(2).setConstant(kNaN);
   raw.covariance.col(2).setConstant(kNaN);
-  EXPECT_EQ(sanitize(raw).verdict.decision, FixDecision::kAccepted);
+  EXPECT_EQ(validate(raw).verdict.decision, FixDecision::kAccepted);
 }
 
-TEST(FixSanitation, MillimetresAndSquaredDegreesAreRaisedToTheFloorF12) {
+TEST(FixValidation, MillimetresAndSquaredDegreesAreRaisedToTheFloor) {
   for (const double variance : {9e-6, 1e-10, 1e-300, std::numeric_limits<double>::denorm_min()}) {
-    const auto result = sanitize(fix_with_covariance(variance, variance, 0.0));
+    const auto result = validate(fix_with_covariance(variance, variance, 0.0));
     EXPECT_EQ(result.verdict.decision, FixDecision::kInflated);
     EXPECT_TRUE(result.verdict.covariance_clamped);
     EXPECT_NE(result.verdict.reason.find("floor"), std::string::npos) << result.verdict.reason;
@@ -219,9 +219,9 @@ TEST(FixSanitation, MillimetresAndSquaredDegreesAreRaisedToTheFloorF12) {
   }
 }
 
-TEST(FixSanitation, HugeVariancesAreLoweredToTheCeilingF12) {
+TEST(FixValidation, HugeVariancesAreLoweredToTheCeiling) {
   for (const double variance : {4.1e4, 1e10, 1e200, kMax}) {
-    const auto result = sanitize(fix_with_covariance(variance, variance, 0.0));
+    const auto result = validate(fix_with_covariance(variance, variance, 0.0));
     EXPECT_EQ(result.verdict.decision, FixDecision::kAccepted) << result.verdict.reason;
     EXPECT_TRUE(result.verdict.covariance_clamped);
     EXPECT_NE(result.verdict.reason.find("ceiling"), std::string::npos) << result.verdict.reason;
@@ -229,18 +229,18 @@ TEST(FixSanitation, HugeVariancesAreLoweredToTheCeilingF12) {
   }
 }
 
-TEST(FixSanitation, AxesAreClampedEachOnItsOwn) {
+TEST(FixValidation, AxesAreClampedEachOnItsOwn) {
   for (const double huge : {1e10, 1e100, kMax}) {
-    const Eigen::Matrix2d covariance = sanitize(fix_with_covariance(huge, 4.0, 0.0)).fix.covariance;
+    const Eigen::Matrix2d covariance = validate(fix_with_covariance(huge, 4.0, 0.0)).fix.covariance;
     EXPECT_NEAR(covariance(0, 0), 4e4, 1e-4);
     EXPECT_NEAR(covariance(1, 1), 4.0, 1e-6);
   }
-  const auto both = sanitize(fix_with_covariance(kMax, 1e-8, 0.0));
+  const auto both = validate(fix_with_covariance(kMax, 1e-8, 0.0));
   EXPECT_EQ(both.verdict.decision, FixDecision::kInflated);
   EXPECT_NEAR(both.fix.covariance(1, 1), 0.09, 1e-9);
 }
 
-TEST(FixSanitation, CorrelationIsKeptF13) {
+TEST(FixValidation, CorrelationIsKept) {
   // A street canyon at 30 degrees: 20 m across, 0.1 m along.
   const Eigen::Matrix2d rotation = Eigen::Rotation2Dd(M_PI / 6.0).toRotationMatrix();
   const auto ellipse = [&](double along, double across) -> Eigen::Matrix2d {
@@ -248,58 +248,58 @@ TEST(FixSanitation, CorrelationIsKeptF13) {
   };
   RawFix raw = good_fix();
   raw.covariance.topLeftCorner<2, 2>() = ellipse(2.0, 20.0);
-  EXPECT_TRUE(is_near(sanitize(raw).fix.covariance, ellipse(2.0, 20.0)));
-  EXPECT_EQ(sanitize(raw).verdict.decision, FixDecision::kAccepted);
+  EXPECT_TRUE(is_near(validate(raw).fix.covariance, ellipse(2.0, 20.0)));
+  EXPECT_EQ(validate(raw).verdict.decision, FixDecision::kAccepted);
   raw.covariance.topLeftCorner<2, 2>() = ellipse(0.1, 20.0);
-  EXPECT_TRUE(is_near(sanitize(raw).fix.covariance, ellipse(0.3, 20.0)));
+  EXPECT_TRUE(is_near(validate(raw).fix.covariance, ellipse(0.3, 20.0)));
   raw.covariance.topLeftCorner<2, 2>() = ellipse(0.1, 2000.0);
-  EXPECT_TRUE(sanitize(raw).fix.covariance.isApprox(ellipse(0.3, 200.0), 1e-6));
+  EXPECT_TRUE(validate(raw).fix.covariance.isApprox(ellipse(0.3, 200.0), 1e-6));
 }
 
-TEST(FixSanitation, CovarianceIsSymmetrised) {
+TEST(FixValidation, CovarianceIsSymmetrised) {
   RawFix raw = good_fix();
   raw.covariance(0, 1) = 3.0;
   raw.covariance(1, 0) = 1.0;
-  const Eigen::Matrix2d covariance = sanitize(raw).fix.covariance;
+  const Eigen::Matrix2d covariance = validate(raw).fix.covariance;
   EXPECT_NEAR(covariance(0, 1), 2.0, 1e-12);
   EXPECT_EQ(covariance(0, 1), covariance(1, 0));
 }
 
-TEST(FixSanitation, OffDiagonalsAreNotReadWhereOnlyTheDiagonalIsKnown) {
+TEST(FixValidation, OffDiagonalsAreNotReadWhereOnlyTheDiagonalIsKnown) {
   RawFix raw = fix_with_covariance(4.0, 9.0, kNaN);
   raw.covariance_type = CovarianceType::kDiagonalKnown;
-  EXPECT_TRUE(is_near(sanitize(raw).fix.covariance, Eigen::Vector2d(4.0, 9.0).asDiagonal()));
+  EXPECT_TRUE(is_near(validate(raw).fix.covariance, Eigen::Vector2d(4.0, 9.0).asDiagonal()));
 }
 
-TEST(FixSanitation, EveryParameterHasAnEffectF36) {
-  FixSanitationParameters parameters;
+TEST(FixValidation, EveryParameterHasAnEffect) {
+  FixValidationParameters parameters;
   parameters.fix_covariance_scale = 4.0;
-  EXPECT_TRUE(is_near(sanitize(good_fix(), parameters).fix.covariance, Eigen::Vector2d(16.0, 36.0).asDiagonal()));
+  EXPECT_TRUE(is_near(validate(good_fix(), parameters).fix.covariance, Eigen::Vector2d(16.0, 36.0).asDiagonal()));
   parameters = {};
   parameters.fix_sigma_floor = 4.0;
-  EXPECT_TRUE(is_near(sanitize(good_fix(), parameters).fix.covariance, isotropic(4.0)));
+  EXPECT_TRUE(is_near(validate(good_fix(), parameters).fix.covariance, isotropic(4.0)));
   parameters = {};
   parameters.fix_sigma_ceiling = 2.5;
-  EXPECT_TRUE(is_near(sanitize(good_fix(), parameters).fix.covariance, Eigen::Vector2d(4.0, 6.25).asDiagonal()));
+  EXPECT_TRUE(is_near(validate(good_fix(), parameters).fix.covariance, Eigen::Vector2d(4.0, 6.25).asDiagonal()));
 }
 
-TEST(FixSanitation, ParametersMustBeInOrder) {
+TEST(FixValidation, ParametersMustBeInOrder) {
   std::vector<std::string> faults;
-  FixSanitationParameters parameters;
-  parameters.check(faults);
+  FixValidationParameters parameters;
+  faults = faults_of(parameters);
   EXPECT_TRUE(faults.empty());
   parameters.fix_sigma_default = 0.1;
-  parameters.check(faults);
+  faults = faults_of(parameters);
   ASSERT_EQ(faults.size(), 1u);
   EXPECT_NE(faults[0].find("fix_sigma_default"), std::string::npos);
   faults.clear();
   parameters.fix_sigma_floor = 300.0;
-  parameters.check(faults);
+  faults = faults_of(parameters);
   ASSERT_EQ(faults.size(), 1u);
   EXPECT_NE(faults[0].find("fix_sigma_floor"), std::string::npos);
 }
 
-TEST(FixSanitation, NothingReceivedLeadsToANonFiniteResultF25) {
+TEST(FixValidation, NothingReceivedLeadsToANonFiniteResult) {
   const double nasty[] = {0.0,
                           -0.0,
                           1.0,
@@ -328,9 +328,9 @@ TEST(FixSanitation, NothingReceivedLeadsToANonFiniteResultF25) {
     return values[std::uniform_int_distribution<std::size_t>(0, std::size(values) - 1)(generator)];
   };
   const LocalFrame frame(kDatum);
-  FixSanitationParameters scaled_up;
+  FixValidationParameters scaled_up;
   scaled_up.fix_covariance_scale = 1e300;
-  const FixSanitationParameters parameter_sets[] = {{}, scaled_up};
+  const FixValidationParameters parameter_sets[] = {{}, scaled_up};
 
   std::size_t used = 0;
   for (int trial = 0; trial < 200000; ++trial) {
@@ -343,7 +343,7 @@ TEST(FixSanitation, NothingReceivedLeadsToANonFiniteResultF25) {
     raw.covariance_type = static_cast<CovarianceType>(trial % 4);
     const std::optional<Stamp> last = trial % 3 == 0 ? std::optional<Stamp>(pick(stamps)) : std::nullopt;
 
-    const auto [fix, verdict] = sanitize_fix(raw, frame, last, parameter_sets[trial % 5 == 0]);
+    const auto [fix, verdict] = validate_fix(raw, frame, last, parameter_sets[trial % 5 == 0]);
     ASSERT_TRUE(fix.position.allFinite());
     ASSERT_TRUE(fix.covariance.allFinite());
     ASSERT_NE(verdict.decision, FixDecision::kNotExamined);

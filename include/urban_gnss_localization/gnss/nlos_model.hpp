@@ -1,0 +1,62 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "urban_gnss_localization/common/parameters.hpp"
+#include "urban_gnss_localization/gnss/satellite.hpp"
+
+namespace urban_gnss {
+
+/// Elevation (rad) at which NLOS parameters are given: 37 degrees, where the sine is 0.6 and the cotangent 4/3.
+inline constexpr double kNlosReferenceElevation_rad = 0.64350110879328438680;
+
+/// How the excess range of an NLOS signal grows with a falling elevation e: a factor that is 1 at 37 degrees.
+enum class NlosElevationLaw {
+  kCotangent,  ///< (cot e / cot 37°)^n down to 15°: the way between walls of a signal that comes over their roofs
+  kCosecant,   ///< (sin 37° / sin e)^n down to 6°: grows less steeply towards the zenith
+};
+EnumNames<NlosElevationLaw> enum_names(NlosElevationLaw);
+
+/// Excess range of an NLOS signal, and what its C/N0 says of whether it is one.
+struct NlosParameters {
+  double mean{18.0};
+  double sigma{15.0};
+  NlosElevationLaw elevation_law{NlosElevationLaw::kCosecant};
+  double elevation_exponent{0.7};
+  double cn0_width{2.5};
+  double cn0_rise{10.0};
+
+  void visit(ParameterVisitor& v) {
+    v("nlos_mean", mean, non_negative(), "m", "mean excess range of an NLOS signal at 37 degrees elevation");
+    v("nlos_sigma", sigma, positive(), "m", "standard deviation of the excess range at 37 degrees elevation");
+    v("nlos_elevation_law", elevation_law, "by which both grow with a falling elevation: cotangent or cosecant");
+    v("nlos_elevation_exponent", elevation_exponent, between(0.0, 5.0), "",
+      "exponent of that law; 0: they do not grow");
+    v("nlos_cn0_width", cn0_width, positive(), "dB", "of C/N0 that change the odds of an NLOS signal by e");
+    v("nlos_cn0_rise", cn0_rise, between(-30.0, 30.0), "dB",
+      "by which the C/N0 of even odds rises from the horizon to the zenith");
+  }
+};
+
+/// Excess range of an NLOS signal.
+struct NlosRange {
+  double mean_m;
+  double sigma_m;
+};
+
+/// At this elevation, `factor` times as large as the parameters say.
+NlosRange nlos_range(double elevation_rad, const NlosParameters& parameters, double factor = 1.0);
+
+/// C/N0 (dB-Hz) that the signal would have at 37 degrees elevation.
+double levelled_cn0_dbhz(const SatelliteObservation& satellite, const NlosParameters& parameters);
+
+/// Log-odds of an NLOS signal against one in line of sight by its C/N0, where at 37 degrees elevation the odds are even
+/// at `even_cn0_dbhz`.
+double nlos_log_odds(const SatelliteObservation& satellite, double even_cn0_dbhz, const NlosParameters& parameters);
+
+double log_odds(double probability);
+/// The inverse, strictly between 0 and 1 for log-odds of any size.
+double probability_of(double log_odds);
+
+}  // namespace urban_gnss

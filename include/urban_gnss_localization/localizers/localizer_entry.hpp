@@ -1,0 +1,51 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "urban_gnss_localization/common/parameters.hpp"
+#include "urban_gnss_localization/localizers/localizer.hpp"
+#include "urban_gnss_localization/motion/motion_model.hpp"
+
+namespace urban_gnss {
+
+/// The parameters of one localizer, and how it is made of them.
+class LocalizerSettings {
+ public:
+  virtual ~LocalizerSettings() = default;
+
+  virtual void visit(ParameterVisitor& v) = 0;
+  /// Requires parameters without faults.
+  virtual std::unique_ptr<Localizer> make() const = 0;
+};
+
+/// Settings of a localizer L that is made of its own parameters P and of the motion's noise.
+template <class L, class P>
+class SettingsWithMotion : public LocalizerSettings {
+ public:
+  void visit(ParameterVisitor& v) override { WithMotion<P>{filter_, motion_}.visit(v); }
+  std::unique_ptr<Localizer> make() const override { return std::make_unique<L>(filter_, motion_); }
+
+ private:
+  P filter_;
+  MotionParameters motion_;
+};
+
+/// How a localizer takes part in comparisons: with some parameters set, under a name of its own.
+struct LocalizerVariant {
+  std::string name;                      ///< "gated_ekf"
+  std::vector<std::string> assignments;  ///< "mode=gated", as --set takes them
+  bool with_occlusion{false};            ///< also behind the occlusion node
+};
+
+/// What nodes, replay, experiments, reports, launch files and documents know of a localizer.
+struct LocalizerEntry {
+  std::string name;     ///< of its node (name_node), its YAML (config/name.yaml) and its section in a user's file
+  std::string summary;  ///< one sentence
+  std::function<std::unique_ptr<LocalizerSettings>()> settings;  ///< the defaults
+  std::vector<LocalizerVariant> variants;
+};
+
+}  // namespace urban_gnss

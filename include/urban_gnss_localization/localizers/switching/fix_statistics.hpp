@@ -1,0 +1,68 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+
+#include "urban_gnss_localization/gnss/nominal_cn0.hpp"
+#include "urban_gnss_localization/localizers/switching/bias_ekf.hpp"
+#include "urban_gnss_localization/localizers/switching/fix_noise_model.hpp"
+#include "urban_gnss_localization/localizers/switching/learnt_scale.hpp"
+
+namespace urban_gnss {
+
+/// Statistics of a receiver's fixes and velocities that the filters learn beside the state: scale of their covariances,
+/// nominal C/N0, standard deviation of ranges, error that all fixes share.
+class FixStatistics {
+ public:
+  /// Requires parameters without faults.
+  explicit FixStatistics(const SwitchingModelParameters& parameters);
+
+  /// Forgets everything.
+  void reset();
+  void move(const Twist2& twist, double duration_s);
+
+  /// s >= 0 since the last fix; since the start where there was none.
+  double elapsed_s(double time_s) const;
+  /// The fix that a filter takes: the position by its ranges (range_fix(), beside the state `before` it) where it has
+  /// them, else the declared one with FixNoiseModel::effective_covariance(). Once a fix, before the others of this
+  /// class.
+  FixMeasurement effective_fix(const FixMeasurement& fix, const BiasGaussian& before);
+  /// Whether the last fix was what its ranges say.
+  bool of_ranges() const { return of_ranges_; }
+  /// m, of a range in line of sight, as learnt.
+  double range_sigma_m() const;
+  FixNoise fix_noise(double time_s) const {
+    if (of_ranges_) return {1.0, range_noise_.correlation_inflation(time_s), true};
+    return {noise_.scale(), noise_.correlation_inflation(time_s), false};
+  }
+  /// Prior odds of a bias of the fix, against those of the parameters: bias_odds of mode_transition().
+  double bias_odds() const { return of_ranges_ ? parameters_.ranges.range_bias_odds : 1.0; }
+  /// A fix was taken, with a share `exceeding` of its NIS beyond the median.
+  void learn_fix(double time_s, double exceeding);
+  /// Lets the noise model see the fix beside the odometry alone; `before` and `after` it, all modes together.
+  void compare_with_odometry(const FixMeasurement& fix, const BiasGaussian& before, const BiasGaussian& after);
+
+  double velocity_scale() const { return velocity_scale_.value(); }
+  /// A velocity was taken; `before` and `after` it, all modes together.
+  void learn_velocity(double exceeding, const BiasGaussian& before, const BiasGaussian& after);
+
+  /// m^2 per axis, of the error that all fixes share.
+  double common_variance_m2() const { return common_variance_m2_; }
+
+ private:
+  /// By the fix's ranges; nothing where they do not tell.
+  std::optional<RelativePlace> place_by_ranges(const FixMeasurement& fix, const BiasGaussian& before);
+
+  SwitchingModelParameters parameters_;
+  FixNoiseModel noise_;
+  FixNoiseModel range_noise_;
+  NominalCn0 nominal_cn0_;
+  bool of_ranges_{false};  ///< the last fix
+  LearntScale velocity_scale_;
+  std::optional<double> last_fix_s_;
+  double moved_s_{0.0};                                   ///< of odometry since the start
+  Eigen::Vector2d corrections_{Eigen::Vector2d::Zero()};  ///< m, what fixes and velocities have moved the position by
+  double common_variance_m2_{0.0};
+};
+
+}  // namespace urban_gnss

@@ -1,0 +1,28 @@
+#pragma once
+
+#include "urban_gnss_localization/motion/motion_model.hpp"
+
+namespace urban_gnss {
+
+/// Speed below which wheels stand: those that do report exactly 0, or the rounding of a tick.
+inline constexpr double kStandstill_mps = 1e-3;
+/// Yaw rate that may be left at a standstill: the offset of a gyroscope, up to 0.6 degrees a second.
+inline constexpr double kStandstill_radps = 0.01;
+/// Mean speed over the time between two fixes below which the robot stood: the jitter of odometry from lidar or cameras
+/// adds up to some centimetres a second, and who creeps more slowly meets the same reflections.
+inline constexpr double kStandstillMean_mps = 0.05;
+
+/// Whether the robot stands during a step of odometry, which then has no error, neither noise nor bias.
+bool is_standstill(const Twist2& twist);
+
+/// What the odometry says of the time since some event, such as the last fix.
+struct Travel {
+  double distance_m{0.0};  ///< forwards and backwards alike
+  double duration_s{0.0};
+
+  void add(const Twist2& twist, double step_s);
+  /// Whether the robot stood on the whole; false where no time has passed.
+  bool is_standstill() const;
+};
+
+}  // namespace urban_gnss

@@ -1,0 +1,56 @@
+#include "urban_gnss_localization/gnss/nlos_model.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "urban_gnss_localization/geometry/angles.hpp"
+
+namespace urban_gnss {
+namespace {
+
+constexpr double kReferenceSine = 0.6;
+constexpr double kReferenceCotangent = 4.0 / 3.0;
+constexpr double kMaxLogOdds = 30.0;
+constexpr double kMaxCn0_dbhz = 70.0;  // beyond it, an invention of a driver
+
+double elevation_factor(double elevation_rad, const NlosParameters& p) {
+  // Lower down, the length of the walls bounds the way.
+  constexpr double kLowest_rad = 15.0 * kPi / 180.0;
+  constexpr double kLowestSine = 0.1;
+  double ratio = 1.0;
+  switch (p.elevation_law) {
+    case NlosElevationLaw::kCotangent:
+      ratio = std::max(0.0, 1.0 / std::tan(std::max(elevation_rad, kLowest_rad))) / kReferenceCotangent;
+      break;
+    case NlosElevationLaw::kCosecant: ratio = kReferenceSine / std::max(std::sin(elevation_rad), kLowestSine); break;
+  }
+  return std::pow(ratio, p.elevation_exponent);
+}
+
+}  // namespace
+
+EnumNames<NlosElevationLaw> enum_names(NlosElevationLaw) {
+  return {{"cotangent", NlosElevationLaw::kCotangent}, {"cosecant", NlosElevationLaw::kCosecant}};
+}
+
+NlosRange nlos_range(double elevation_rad, const NlosParameters& p, double factor) {
+  const double scale = factor * elevation_factor(elevation_rad, p);
+  return {scale * p.mean, scale * p.sigma};
+}
+
+double levelled_cn0_dbhz(const SatelliteObservation& satellite, const NlosParameters& p) {
+  return satellite.cn0_dbhz - p.cn0_rise * (std::sin(satellite.look.elevation_rad) - kReferenceSine);
+}
+
+double nlos_log_odds(const SatelliteObservation& satellite, double even_cn0_dbhz, const NlosParameters& p) {
+  const double weaker_db = even_cn0_dbhz - std::min(levelled_cn0_dbhz(satellite, p), kMaxCn0_dbhz);
+  return weaker_db / p.cn0_width;
+}
+
+double log_odds(double probability) { return std::log(probability / (1.0 - probability)); }
+
+double probability_of(double log_odds) {
+  return 1.0 / (1.0 + std::exp(-std::clamp(log_odds, -kMaxLogOdds, kMaxLogOdds)));
+}
+
+}  // namespace urban_gnss

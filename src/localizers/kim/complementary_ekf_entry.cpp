@@ -1,0 +1,25 @@
+#include "urban_gnss_localization/localizers/kim/complementary_ekf.hpp"
+#include "urban_gnss_localization/localizers/localizer_entry.hpp"
+
+namespace urban_gnss {
+namespace {
+
+class ComplementaryEkfSettings : public LocalizerSettings {
+ public:
+  void visit(ParameterVisitor& v) override { v.include(filter_); }
+  std::unique_ptr<Localizer> make() const override { return std::make_unique<ComplementaryEkf>(filter_); }
+
+ private:
+  ComplementaryEkfParameters filter_;
+};
+
+}  // namespace
+
+LocalizerEntry complementary_ekf_entry() {
+  return {"complementary_ekf",
+          "Kim et al.: a complementary EKF whose bias filter opens where the fixes contradict the odometry.",
+          std::make_unique<ComplementaryEkfSettings>,
+          {{"ekf", {"mode=standard"}}, {"gated_ekf", {"mode=gated"}}, {"complementary_ekf", {"mode=compensated"}}}};
+}
+
+}  // namespace urban_gnss

@@ -1,0 +1,13 @@
+#include "urban_gnss_localization/localizers/localizer_entry.hpp"
+#include "urban_gnss_localization/localizers/maier/ukf.hpp"
+
+namespace urban_gnss {
+
+LocalizerEntry ukf_entry() {
+  return {"ukf",
+          "Maier and Kleiner: an unscented Kalman filter, behind occlusion_node or on its own.",
+          std::make_unique<SettingsWithMotion<Ukf, UkfParameters>>,
+          {{"ukf", {}, true}}};
+}
+
+}  // namespace urban_gnss

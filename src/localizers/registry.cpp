@@ -1,0 +1,59 @@
+#include "urban_gnss_localization/localizers/registry.hpp"
+
+#include <algorithm>
+#include <stdexcept>
+
+// Every localizer of the package, a line each. A folder below localizers/ provides `LocalizerEntry NAME_entry()`;
+// CMakeLists.txt reads these lines, too, and builds the node NAME_node.
+#define URBAN_GNSS_LOCALIZERS(X) \
+  X(particle_filter)             \
+  X(complementary_ekf)           \
+  X(ukf)                         \
+  X(imm_ekf)                     \
+  X(switching_particle_filter)
+
+namespace urban_gnss {
+
+#define DECLARE_ENTRY(name) LocalizerEntry name##_entry();
+URBAN_GNSS_LOCALIZERS(DECLARE_ENTRY)
+#undef DECLARE_ENTRY
+
+LocalizerRegistry standard_localizers() {
+#define CALL_ENTRY(name) name##_entry(),
+  return LocalizerRegistry({URBAN_GNSS_LOCALIZERS(CALL_ENTRY)});
+#undef CALL_ENTRY
+}
+
+std::string LocalizerRegistry::names() const {
+  std::string all;
+  for (std::size_t i = 0; i < entries_.size(); ++i) {
+    all += (i == 0 ? "" : i + 1 < entries_.size() ? ", " : " or ") + entries_[i].name;
+  }
+  return all;
+}
+
+const LocalizerEntry& LocalizerRegistry::find(const std::string& name) const {
+  const auto found = std::find_if(entries_.begin(), entries_.end(), [&](const auto& each) { return each.name == name; });
+  if (found == entries_.end()) throw std::runtime_error(name + ": no such localizer; there are " + names());
+  return *found;
+}
+
+LocalizerChoice LocalizerRegistry::choose(const std::string& name) const {
+  for (const LocalizerEntry& entry : entries_) {
+    if (entry.name == name) return {&entry, {}};
+    for (const LocalizerVariant& variant : entry.variants) {
+      if (variant.name == name) return {&entry, variant.assignments};
+    }
+  }
+  std::string others;
+  for (const LocalizerVariant& variant : variants()) others += (others.empty() ? "" : ", ") + variant.name;
+  throw std::runtime_error(name + ": no such localizer; there are " + names() + ", in comparisons also as " + others);
+}
+
+std::vector<LocalizerVariant> LocalizerRegistry::variants() const {
+  std::vector<LocalizerVariant> all;
+  for (const LocalizerEntry& entry : entries_) all.insert(all.end(), entry.variants.begin(), entry.variants.end());
+  return all;
+}
+
+}  // namespace urban_gnss

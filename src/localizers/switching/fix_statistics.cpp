@@ -1,0 +1,106 @@
+#include "urban_gnss_localization/localizers/switching/fix_statistics.hpp"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+
+namespace urban_gnss {
+namespace {
+
+constexpr int kYaw = 2;
+
+/// A fix of ranges tells its own covariance; what is learnt is how good ranges in line of sight are: the factor on the
+/// square of middle_range_sigma_m().
+FixNoiseModelParameters range_noise(const SwitchingModelParameters& p) {
+  FixNoiseModelParameters noise = p.noise;
+  noise.fix_correlation_time = p.ranges.range_correlation_time;
+  const double middle_m = p.ranges.middle_range_sigma_m();
+  noise.fix_scale_limit = p.ranges.range_sigma_max / middle_m;
+  noise.first_fix_scale = std::pow(p.ranges.range_sigma / middle_m, 2);
+  return noise;
+}
+
+}  // namespace
+
+FixStatistics::FixStatistics(const SwitchingModelParameters& parameters)
+    : parameters_(parameters),
+      noise_(parameters.noise, parameters.fix_scale_lag),
+      range_noise_(range_noise(parameters)),
+      velocity_scale_(parameters.velocity.fresh_scale()) {}
+
+void FixStatistics::reset() {
+  noise_.reset();
+  range_noise_.reset();
+  nominal_cn0_.reset();
+  of_ranges_ = false;
+  velocity_scale_ = parameters_.velocity.fresh_scale();
+  last_fix_s_.reset();
+  moved_s_ = 0.0;
+  corrections_.setZero();
+  common_variance_m2_ = 0.0;
+}
+
+void FixStatistics::move(const Twist2& twist, double duration_s) {
+  moved_s_ += duration_s;
+  noise_.move(twist, duration_s);
+  range_noise_.move(twist, duration_s);
+}
+
+double FixStatistics::elapsed_s(double time_s) const {
+  return last_fix_s_ ? std::max(time_s - *last_fix_s_, 0.0) : moved_s_;
+}
+
+double FixStatistics::range_sigma_m() const {
+  if (parameters_.noise.fix_scale_rate == 0.0) return parameters_.ranges.range_sigma;
+  return parameters_.ranges.middle_range_sigma_m() * std::sqrt(range_noise_.scale());
+}
+
+std::optional<RelativePlace> FixStatistics::place_by_ranges(const FixMeasurement& fix, const BiasGaussian& before) {
+  if (!parameters_.ranges.use_ranges || fix.satellites.empty()) return std::nullopt;
+  nominal_cn0_.add(fix.satellites, parameters_.ranges.nlos);
+  const auto nominal_dbhz = nominal_cn0_.dbhz();
+  if (!nominal_dbhz) return std::nullopt;
+  RelativePlace known;
+  known.offset = transform_point(before.pose(), fix.antenna_in_body) - fix.position;
+  known.covariance = before.covariance.topLeftCorner<2, 2>();
+  RangeFixParameters ranges = parameters_.ranges;
+  ranges.range_sigma = range_sigma_m();
+  return range_fix(fix.satellites, *nominal_dbhz, known, ranges);
+}
+
+FixMeasurement FixStatistics::effective_fix(const FixMeasurement& fix, const BiasGaussian& before) {
+  const auto place = place_by_ranges(fix, before);
+  of_ranges_ = place.has_value();
+  FixMeasurement effective = fix;
+  if (place) effective.position += place->offset;
+  effective.covariance = place ? place->covariance : noise_.effective_covariance(fix.covariance);
+  return effective;
+}
+
+void FixStatistics::learn_velocity(double exceeding, const BiasGaussian& before, const BiasGaussian& after) {
+  velocity_scale_.learn(exceeding);
+  corrections_ += after.mean.head<2>() - before.mean.head<2>();
+}
+
+void FixStatistics::learn_fix(double time_s, double exceeding) {
+  (of_ranges_ ? range_noise_ : noise_).learn(time_s, exceeding);
+  last_fix_s_ = time_s;
+}
+
+void FixStatistics::compare_with_odometry(const FixMeasurement& fix, const BiasGaussian& before,
+                                          const BiasGaussian& after) {
+  const double walk = parameters_.odometry.position_walk;
+  DeadReckonedFix beside;
+  beside.place = transform_point(before.pose(), fix.antenna_in_body) - corrections_;
+  beside.misfit = fix.position - beside.place;
+  beside.covariance = parameters_.fix.direct_covariance(fix.covariance);
+  beside.walk_m2 = walk * walk * moved_s_;
+  beside.heading_sigma_rad = std::sqrt(before.covariance(kYaw, kYaw));
+  beside.time_s = fix.time_s;
+  if (!of_ranges_) noise_.compare(beside);
+  corrections_ += after.mean.head<2>() - before.mean.head<2>();
+  const double common = parameters_.common_error_sigma;
+  common_variance_m2_ = std::min(common * common, 0.5 * beside.covariance.trace());
+}
+
+}  // namespace urban_gnss

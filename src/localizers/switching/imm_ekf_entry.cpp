@@ -1,0 +1,13 @@
+#include "urban_gnss_localization/localizers/localizer_entry.hpp"
+#include "urban_gnss_localization/localizers/switching/imm_ekf.hpp"
+
+namespace urban_gnss {
+
+LocalizerEntry imm_ekf_entry() {
+  return {"imm_ekf",
+          "Our own: interacting multiple models of a bias that comes and goes; the odometry's errors are states.",
+          std::make_unique<SettingsWithMotion<ImmEkf, ImmEkfParameters>>,
+          {{"imm_ekf", {}, true}}};
+}
+
+}  // namespace urban_gnss

@@ -1,0 +1,13 @@
+#include "urban_gnss_localization/localizers/localizer_entry.hpp"
+#include "urban_gnss_localization/localizers/switching/switching_particle_filter.hpp"
+
+namespace urban_gnss {
+
+LocalizerEntry switching_particle_filter_entry() {
+  return {"switching_particle_filter",
+          "The model of imm_ekf with particles, for a start whose heading is unknown.",
+          std::make_unique<SettingsWithMotion<SwitchingParticleFilter, SwitchingParticleFilterParameters>>,
+          {{"switching", {}, true}}};
+}
+
+}  // namespace urban_gnss

@@ -1,0 +1,219 @@
+#include "urban_gnss_localization/parameters/parameter_reader.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+namespace urban_gnss {
+namespace {
+
+constexpr const char* kExpert = "expert";
+
+std::size_t edit_distance(const std::string& a, const std::string& b) {
+  std::vector<std::size_t> row(b.size() + 1);
+  std::iota(row.begin(), row.end(), 0);
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    std::size_t diagonal = row[0];
+    row[0] = i;
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      const std::size_t above = row[j];
+      row[j] = std::min({row[j] + 1, row[j - 1] + 1, diagonal + (a[i - 1] == b[j - 1] ? 0 : 1)});
+      diagonal = above;
+    }
+  }
+  return row[b.size()];
+}
+
+std::string last_name(const std::string& path) { return path.substr(path.rfind('.') + 1); }
+
+std::string text_of(const YAML::Node& node) {
+  if (!node.IsDefined()) return "(default)";
+  if (node.IsScalar()) return node.Scalar();
+  YAML::Emitter out;
+  out.SetMapFormat(YAML::Flow);
+  out.SetSeqFormat(YAML::Flow);
+  out << node;
+  return out.c_str();
+}
+
+}  // namespace
+
+ParameterReader::ParameterReader(const YAML::Node& map, std::string source, std::string path, Layout layout)
+    : map_(map.IsDefined() ? map : YAML::Node()),
+      source_(std::move(source)),
+      prefix_(std::move(path)),
+      layout_(layout) {}
+
+void ParameterReader::ignore(const std::string& name) { ignored_.insert(name); }
+
+YAML::Node ParameterReader::child(const std::string& name) {
+  known_.insert(name);
+  return has(name) ? map_[name] : YAML::Node();
+}
+
+std::string ParameterReader::path_of(const ParameterKey& key) const {
+  if (layout_ == Layout::kFlat || key.is_basic) return key.name;
+  std::string path = std::string(kExpert) + ".";
+  for (const std::string& group : groups_) path += group + ".";
+  return path + key.name;
+}
+
+YAML::Node ParameterReader::at_path(const std::string& path) const {
+  YAML::Node node = map_;
+  std::size_t begin = 0;
+  while (true) {
+    const std::size_t dot = path.find('.', begin);
+    const std::string name = path.substr(begin, dot == std::string::npos ? dot : dot - begin);
+    if (!has(node, name)) return YAML::Node(YAML::NodeType::Undefined);
+    node.reset(node[name]);
+    if (dot == std::string::npos) return node;
+    begin = dot + 1;
+  }
+}
+
+YAML::Node ParameterReader::find(const ParameterKey& key) {
+  const std::string path = path_of(key);
+  known_.insert(path);
+  if (!structs_.empty()) structs_.back().path_of[key.name] = path;
+  return at_path(path);
+}
+
+std::string ParameterReader::place(const YAML::Node& node) const {
+  if (source_.empty()) return "";
+  const int line = node.IsDefined() ? node.Mark().line : -1;  // from 0; negative where it was not read from a text
+  return source_ + (line >= 0 ? ":" + std::to_string(line + 1) : "") + ": ";
+}
+
+std::string ParameterReader::place_of(const std::string& path) const {
+  const YAML::Node node = at_path(path);
+  return place(node.IsDefined() ? node : map_);
+}
+
+void ParameterReader::fault(const std::string& name, const std::string& text) {
+  faults_.push_back(place_of(name) + prefix_ + name + ": " + text);
+}
+
+void ParameterReader::fault(const YAML::Node& node, const std::string& name, const std::string& text) {
+  faults_.push_back(place(node) + prefix_ + name + ": " + text);
+}
+
+void ParameterReader::bad_value(const ParameterKey& key, const std::string& fault) {
+  const std::string path = path_of(key);
+  faults_.push_back(place_of(path) + prefix_ + path + " = " + text_of(at_path(path)) + ": " + fault);
+}
+
+template <class T>
+bool ParameterReader::convert(const ParameterKey& key, T& value, const char* expected) {
+  const YAML::Node node = find(key);
+  if (!node.IsDefined()) return false;
+  try {
+    value = node.as<T>();
+    return true;
+  } catch (const YAML::Exception&) {
+    bad_value(key, std::string("must be ") + expected);
+    return false;
+  }
+}
+
+void ParameterReader::on_number(const ParameterKey& key, double& value, const Range& range) {
+  if (convert(key, value, "a number") && !range.contains(value)) bad_value(key, "must be " + range.describe());
+}
+
+void ParameterReader::on_integer(const ParameterKey& key, int& value, const Range& range) {
+  if (convert(key, value, "a whole number") && !range.contains(value)) bad_value(key, "must be " + range.describe());
+}
+
+void ParameterReader::on_list(const ParameterKey& key, std::vector<double>& value) {
+  if (!convert(key, value, "a list of numbers")) return;
+  if (!std::all_of(value.begin(), value.end(), [](double element) { return std::isfinite(element); })) {
+    bad_value(key, "must be finite numbers");
+  }
+}
+
+void ParameterReader::on_boolean(const ParameterKey& key, bool& value) { convert(key, value, "true or false"); }
+
+void ParameterReader::on_text(const ParameterKey& key, std::string& value) { convert(key, value, "a text"); }
+
+void ParameterReader::on_choice(const ParameterKey& key, std::size_t& chosen,
+                                const std::vector<const char*>& choices) {
+  const YAML::Node node = find(key);
+  if (!node.IsDefined()) return;
+  std::string all;
+  for (std::size_t i = 0; i < choices.size(); ++i) {
+    if (text_of(node) == choices[i]) {
+      chosen = i;
+      return;
+    }
+    all += (i == 0 ? "" : ", ") + std::string(choices[i]);
+  }
+  bad_value(key, "must be one of " + all);
+}
+
+void ParameterReader::on_begin(const char* group, const char*) {
+  structs_.push_back({group != nullptr, {}});
+  if (group != nullptr) groups_.emplace_back(group);
+}
+
+void ParameterReader::on_end(const std::vector<std::string>& faults) {
+  const Struct& ended = structs_.back();
+  for (const std::string& text : faults) {
+    const std::string name = text.substr(0, text.find_first_of(" :"));
+    const auto path = ended.path_of.find(name);
+    if (path == ended.path_of.end()) {
+      faults_.push_back(place(map_) + prefix_ + text);
+    } else {
+      faults_.push_back(place_of(path->second) + prefix_ + path->second + text.substr(name.size()));
+    }
+  }
+  if (ended.has_group) groups_.pop_back();
+  structs_.pop_back();
+}
+
+/// What someone may have meant who wrote `path`; empty where nothing is like it.
+std::string ParameterReader::hint(const std::string& path) const {
+  const std::string name = last_name(path);
+  for (const std::string& known : known_) {
+    if (last_name(known) == name) return "; it is " + prefix_ + known;
+  }
+  const auto nearest = std::min_element(known_.begin(), known_.end(), [&](const auto& a, const auto& b) {
+    return edit_distance(name, last_name(a)) < edit_distance(name, last_name(b));
+  });
+  const bool is_near =
+      nearest != known_.end() && edit_distance(name, last_name(*nearest)) <= 1 + name.size() / 3;
+  return is_near ? "; did you mean " + prefix_ + *nearest + "?" : "";
+}
+
+void ParameterReader::find_unknown(const YAML::Node& map, const std::string& prefix,
+                                   std::vector<std::string>& faults) const {
+  for (const auto& entry : map) {
+    if (!entry.first.IsScalar()) {
+      faults.push_back(place(entry.first) + "a parameter's name must be a text");
+      continue;
+    }
+    const std::string path = prefix + entry.first.Scalar();
+    if (known_.count(path) > 0 || ignored_.count(path) > 0) continue;
+    const std::string group = path + ".";
+    const auto first_below = known_.lower_bound(group);
+    const bool is_group = first_below != known_.end() && first_below->compare(0, group.size(), group) == 0;
+    if (!is_group) {
+      faults.push_back(place(entry.first) + prefix_ + path + ": no such parameter" + hint(path));
+    } else if (entry.second.IsMap()) {
+      find_unknown(entry.second, group, faults);
+    } else if (!entry.second.IsNull()) {
+      faults.push_back(place(entry.first) + prefix_ + path + ": must be a map of names to values");
+    }
+  }
+}
+
+std::vector<std::string> ParameterReader::finish() const {
+  std::vector<std::string> faults = faults_;
+  if (map_.IsMap()) {
+    find_unknown(map_, "", faults);
+  } else if (!map_.IsNull()) {
+    const std::string name = prefix_.empty() ? "parameters" : prefix_.substr(0, prefix_.find_last_not_of('.') + 1);
+    faults.push_back(place(map_) + name + " must be a map of names to values");
+  }
+  return faults;
+}
+
+}  // namespace urban_gnss

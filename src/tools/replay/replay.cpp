@@ -1,0 +1,302 @@
+// Runs a bag through the same core as the live nodes: offline, deterministic, as fast as the machine can.
+
+#include <rosbag/bag.h>
+#include <tf2_msgs/TFMessage.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+#include <iomanip>
+#include <iostream>
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "bag_messages.hpp"
+#include "output_file.hpp"
+#include "replay_parameters.hpp"
+#include "urban_gnss_localization/common/progress.hpp"
+#include "urban_gnss_localization/evaluation/report_json.hpp"
+#include "urban_gnss_localization/evaluation/tum.hpp"
+#include "urban_gnss_localization/localizers/kim/complementary_ekf.hpp"
+#include "urban_gnss_localization/localizers/maier/ukf.hpp"
+#include "urban_gnss_localization/localizers/switching/imm_ekf.hpp"
+#include "urban_gnss_localization/localizers/switching/switching_particle_filter.hpp"
+#include "urban_gnss_localization/pipeline/bias_responder.hpp"
+#include "urban_gnss_localization/ros/conversions.hpp"
+#include "urban_gnss_localization/ros/topics.hpp"
+#include "urban_gnss_localization/ros/visibility_messages.hpp"
+
+namespace fs = std::filesystem;
+using namespace urban_gnss;
+using urban_gnss_localization::SatelliteArray;
+
+namespace {
+
+/// The pipeline and the bias filter of one run, with what it writes.
+class Replay {
+ public:
+  Replay(const ReplayOptions& options, const ReplayParameters& parameters)
+      : parameters_(parameters),
+        pipeline_(parameters.node.localization, make_localizer(options.localizer, parameters)),
+        bias_responder_(parameters.bias) {
+    if (!options.output.empty()) {
+      const fs::path path(options.output);
+      if (path.has_parent_path()) fs::create_directories(path.parent_path());
+      bag_.open(options.output, rosbag::bagmode::Write);
+    }
+  }
+
+  void add_odometry(const nav_msgs::Odometry& message) {
+    newest_ = to_stamp(message.header.stamp);
+    pipeline_.add_odometry(to_odometry_sample(message));
+    settle();
+  }
+  void add_fix(const sensor_msgs::NavSatFix& message) {
+    pipeline_.add_fix(to_raw_fix(message));
+    settle();
+  }
+  void add_satellites(const SatelliteArray& message) {
+    pipeline_.add_satellites(to_stamp(message.header.stamp), to_observations(message));
+    settle();
+  }
+  void add_velocity(const RawVelocity& velocity) {
+    pipeline_.add_velocity(velocity);
+    settle();
+  }
+  void add_imu(const sensor_msgs::Imu& message) {
+    if (const auto rate = to_yaw_rate(message)) pipeline_.add_imu_yaw_rate(to_stamp(message.header.stamp), *rate);
+  }
+  void set_datum(const sensor_msgs::NavSatFix& message) {
+    bag_datum_ = to_geodetic(message);
+    if (!pipeline_.frame()) pipeline_.set_datum(*bag_datum_);
+    settle();
+  }
+  void add_truth(const nav_msgs::Odometry& message) { truth_.push_back(to_timed_pose(message)); }
+
+  void close() {
+    if (bag_.isOpen()) bag_.close();
+  }
+
+  const Trajectory& estimate() const { return estimate_; }
+  const std::map<std::string, std::size_t>& decisions() const { return decisions_; }
+  const LocalizationPipeline& pipeline() const { return pipeline_; }
+
+  /// The truth in the frame of this run's datum.
+  std::optional<Trajectory> truth() const {
+    if (truth_.empty() || !pipeline_.frame()) return std::nullopt;
+    if (!bag_datum_) {
+      std::cerr << "replay: the bag has a truth but no gps/datum; the truth is taken to be in the frame of the datum\n";
+      return truth_;
+    }
+    const LocalFrame theirs(*bag_datum_);
+    Trajectory moved = truth_;
+    for (TimedPose& timed : moved) {
+      const Eigen::Vector3d point = pipeline_.frame()->to_local(theirs.to_geodetic({timed.pose.x, timed.pose.y, 0.0}));
+      timed.pose.x = point.x();
+      timed.pose.y = point.y();
+    }
+    sort_by_stamp(moved);
+    return moved;
+  }
+
+ private:
+  std::unique_ptr<Localizer> make_localizer(const std::string& name, const ReplayParameters& parameters) {
+    if (name == "particle_filter") return make_particle_filter(parameters.filter, parameters.motion);
+    if (name == "imm_ekf") return std::make_unique<ImmEkf>(parameters.imm, parameters.motion);
+    if (name == "ukf") return std::make_unique<Ukf>(parameters.ukf, parameters.motion);
+    if (name == "complementary_ekf") return std::make_unique<ComplementaryEkf>(parameters.complementary);
+    throw std::runtime_error("--localizer " + name +
+                             ": no such localizer; there are particle_filter, imm_ekf, complementary_ekf, ukf");
+  }
+
+  /// Answers the pipeline's questions for the bias, as gps_bias_node does live, and writes what came of it.
+  void settle() {
+    write_biases(bias_responder_.answer(pipeline_));
+    for (const PipelineEvent& event : pipeline_.take_events()) {
+      std::cerr << "[" << std::fixed << std::setprecision(3) << to_seconds(newest_) << "] " << event.text << '\n';
+    }
+    for (const LocalizationOutput& output : pipeline_.take_outputs()) {
+      estimate_.push_back({output.stamp, output.estimate.pose, output.estimate.covariance});
+      write(topics::kEstimate, output.stamp, to_message(output, parameters_.node.frames));
+      tf2_msgs::TFMessage tf;
+      tf.transforms.push_back(to_map_to_odom(output, parameters_.node.frames, parameters_.node.transform_time_offset));
+      write("tf", output.stamp, tf);
+    }
+    write_biases(pipeline_.take_bias_estimates());
+    const std::vector<FixVerdict> verdicts = pipeline_.take_verdicts();
+    for (const FixVerdict& verdict : verdicts) ++decisions_[to_string(verdict.decision)];
+    for (const auto& status : to_status_messages(pipeline_, verdicts, to_ros(newest_), parameters_.node.frames.map)) {
+      write(topics::kStatus, newest_, status);
+    }
+  }
+
+  void write_biases(const std::vector<BiasEstimate>& biases) {
+    for (const BiasEstimate& bias : biases) {
+      write(topics::kBias, bias.stamp, to_message(bias, parameters_.node.frames.map));
+    }
+  }
+
+  template <class M>
+  void write(const std::string& topic, Stamp stamp, const M& message) {
+    if (bag_.isOpen()) bag_.write("/" + topic, std::max(to_ros(stamp), ros::TIME_MIN), message);
+  }
+
+  ReplayParameters parameters_;
+  LocalizationPipeline pipeline_;
+  BiasResponder bias_responder_;
+  rosbag::Bag bag_;
+  Stamp newest_{0};
+  std::optional<GeodeticPosition> bag_datum_;
+  Trajectory estimate_;
+  Trajectory truth_;
+  std::map<std::string, std::size_t> decisions_;
+};
+
+void print_summary(const Replay& replay, const nlohmann::json& metrics, double wall_s, double bag_s) {
+  std::cout << replay.estimate().size() << " estimates in " << std::fixed << std::setprecision(2) << wall_s << " s ("
+            << std::setprecision(0) << bag_s / std::max(wall_s, 1e-3) << " times real time)\n";
+  std::cout << "fixes:";
+  for (const auto& [decision, count] : replay.decisions()) std::cout << "  " << decision << " " << count;
+  std::cout << '\n';
+  if (!metrics.contains("errors")) return;
+  const auto& position = metrics["errors"]["position_m"];
+  if (position["median"].is_null()) return;
+  std::cout << std::setprecision(2) << "position error, m: median " << position["median"].get<double>() << ", mean "
+            << position["mean"].get<double>() << ", 95 % " << position["p95"].get<double>() << ", max "
+            << position["max"].get<double>() << "; the truth was covered to "
+            << 100.0 * metrics["errors"]["coverage"].get<double>() << " %\n";
+}
+
+void run(const ReplayOptions& options) {
+  const ReplayParameters parameters = read_parameters(options);
+  if (!fs::exists(options.input)) throw std::runtime_error(options.input + ": no such bag");
+  rosbag::Bag bag(options.input, rosbag::bagmode::Read);
+
+  const std::string fix = without_leading_slash(options.fix_topic);
+  const std::string odom = without_leading_slash(options.odom_topic);
+  const std::string imu = without_leading_slash(options.imu_topic);
+  const std::string velocity = without_leading_slash(options.velocity_topic);
+  const std::string satellites = without_leading_slash(options.satellites_topic);
+  const std::string truth = without_leading_slash(options.truth_topic);
+  const auto messages = ordered_messages(bag, {topics::kDatum, imu, odom, fix, velocity, satellites, truth});
+  const auto count = [&](const std::string& name) {
+    return std::count_if(messages.begin(), messages.end(),
+                         [&](const auto& message) { return without_leading_slash(message.getTopic()) == name; });
+  };
+  const auto require = [&](const std::string& option, const std::string& name) {
+    if (count(name) > 0) return;
+    std::string present;
+    rosbag::View all(bag);
+    for (const rosbag::ConnectionInfo* connection : all.getConnections()) {
+      present += "\n  " + connection->topic + " (" + connection->datatype + ")";
+    }
+    throw std::runtime_error(options.input + " has no message on " + name + " (" + option + "); it has" + present);
+  };
+  require("--fix-topic", fix);
+  require("--odom-topic", odom);
+  if (options.wants_imu) require("--imu-topic", imu);
+  if (options.wants_velocity) require("--velocity-topic", velocity);
+  if (options.wants_satellites) require("--satellites-topic", satellites);
+
+  Replay replay(options, parameters);
+  Progress progress(messages.size(), "messages");
+  const auto start = std::chrono::steady_clock::now();
+  std::size_t done = 0;
+  for (const rosbag::MessageInstance& message : messages) {
+    const std::string name = without_leading_slash(message.getTopic());
+    if (name == odom) {
+      replay.add_odometry(*expect<nav_msgs::Odometry>(message));
+    } else if (name == fix) {
+      replay.add_fix(*expect<sensor_msgs::NavSatFix>(message));
+    } else if (name == velocity) {
+      const auto measured = to_raw_velocity_of(message);
+      if (!measured) throw wrong_type(message, kVelocityTypes);
+      replay.add_velocity(*measured);
+    } else if (name == satellites) {
+      replay.add_satellites(*expect<SatelliteArray>(message));
+    } else if (name == imu) {
+      replay.add_imu(*expect<sensor_msgs::Imu>(message));
+    } else if (name == truth) {
+      replay.add_truth(*expect<nav_msgs::Odometry>(message));
+    } else {
+      replay.set_datum(*expect<sensor_msgs::NavSatFix>(message));
+    }
+    progress.report(++done);
+  }
+  progress.finish();
+  replay.close();
+  const double wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+
+  const LocalizationReport report = replay.pipeline().report();
+  nlohmann::json metrics = {{"bag", fs::path(options.input).filename().string()},
+                            {"localizer", options.localizer},
+                            {"mode", replay.pipeline().localizer().mode()},
+                            {"seed", parameters.filter.seed},
+                            {"estimates", replay.estimate().size()},
+                            {"decisions", replay.decisions()},
+                            {"fixes_with_ranges", report.fixes_with_ranges},
+                            {"velocities_used", report.velocities_used}};
+  metrics["final_state"] = to_string(report.state);
+  if (const auto& frame = replay.pipeline().frame()) {
+    metrics["datum"] = {frame->datum().latitude_deg, frame->datum().longitude_deg, frame->datum().altitude_m};
+  }
+  if (const auto reference = replay.truth()) {
+    metrics["errors"] = to_json(errors_at_truth(*reference, replay.estimate()).summary);
+  }
+  if (!options.json_file.empty()) {
+    write_file(options.json_file, [&](std::ostream& out) { out << metrics.dump(2) << '\n'; });
+  }
+  if (!options.tum_file.empty()) {
+    write_file(options.tum_file, [&](std::ostream& out) { write_tum(out, replay.estimate()); });
+  }
+  const double bag_s = messages.empty() ? 0.0 : (messages.back().getTime() - messages.front().getTime()).toSec();
+  print_summary(replay, metrics, wall_s, bag_s);
+  if (replay.estimate().empty()) {
+    throw std::runtime_error("no estimate: still waiting for " + replay.pipeline().waiting_for());
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  ReplayOptions options;
+  CLI::App app("Runs a bag through a localizer offline; the same input, parameters and seed give the same output.");
+  app.option_defaults()->always_capture_default();
+  app.add_option("bag", options.input, "the bag to read")->required();
+  app.add_option("--localizer", options.localizer, "particle_filter, imm_ekf, complementary_ekf or ukf");
+  app.add_option("--params", options.params, "YAML with the nodes' parameters; repeatable, later files win");
+  app.add_option("--set", options.overrides, "one parameter, NAME=VALUE; repeatable");
+  app.add_option("--output", options.output, "bag to write: odometry/filtered, gps/bias, status, tf");
+  app.add_option("--fix-topic", options.fix_topic, "sensor_msgs/NavSatFix");
+  app.add_option("--odom-topic", options.odom_topic, "nav_msgs/Odometry");
+  const auto* velocity_topic = app.add_option(
+      "--velocity-topic", options.velocity_topic,
+      "the receiver's velocity, east and north: " + std::string(kVelocityTypes) + ", where the bag has it; \"\": none");
+  const auto* imu_topic = app.add_option("--imu-topic", options.imu_topic,
+                                         "sensor_msgs/Imu whose yaw rate is used instead of the odometry's, where the "
+                                         "bag has it; \"\": none");
+  const auto* satellites_topic = app.add_option("--satellites-topic", options.satellites_topic,
+                                                "urban_gnss_localization/SatelliteArray, whose residuals tell the "
+                                                "ranges of a fix, where the bag has it; \"\": none");
+  app.add_option("--truth-topic", options.truth_topic, "nav_msgs/Odometry, for the errors only");
+  app.add_option("--datum", options.datum,
+                 "LAT,LON,ALT (deg, deg, m); default: the bag's gps/datum, or the first fixes")
+      ->delimiter(',')
+      ->expected(3);
+  app.add_option("--seed", options.seed, "seed of the random numbers; default: as in the parameters");
+  app.add_option("--json", options.json_file, "write decisions and errors here");
+  app.add_option("--tum", options.tum_file, "write the trajectory here (TUM format, ENU about the datum)");
+  CLI11_PARSE(app, argc, argv);
+  options.wants_velocity = velocity_topic->count() > 0 && !options.velocity_topic.empty();
+  options.wants_satellites = satellites_topic->count() > 0 && !options.satellites_topic.empty();
+  options.wants_imu = imu_topic->count() > 0 && !options.imu_topic.empty();
+  try {
+    run(options);
+  } catch (const std::exception& error) {
+    std::cerr << "replay: " << error.what() << '\n';
+    return 1;
+  }
+  return 0;
+}

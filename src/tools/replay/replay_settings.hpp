@@ -1,0 +1,47 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "urban_gnss_localization/localizers/registry.hpp"
+#include "urban_gnss_localization/ros/gps_bias_node_parameters.hpp"
+#include "urban_gnss_localization/ros/registered_localizer_node.hpp"
+#include "urban_gnss_localization/ros/topics.hpp"
+
+namespace urban_gnss {
+
+/// What the command line says.
+struct ReplayOptions {
+  std::string input;
+  std::string localizer = "imm_ekf";
+  std::vector<std::string> params;
+  std::vector<std::string> overrides;
+  std::string output;
+  std::string fix_topic = topics::kFix;
+  std::string odom_topic = topics::kOdometry;
+  std::string imu_topic = topics::kImu;
+  bool wants_imu = false;  ///< imu_topic was asked for
+  std::string velocity_topic = topics::kVelocity;
+  bool wants_velocity = false;  ///< velocity_topic was asked for
+  std::string satellites_topic = topics::kSatellites;
+  bool wants_satellites = false;  ///< satellites_topic was asked for
+  std::string truth_topic = topics::kTruth;
+  std::vector<double> datum;
+  int seed = -1;
+  std::string json_file;
+  std::string tum_file;
+};
+
+/// What the live localizer and the live bias node read.
+struct ReplaySettings {
+  LocalizerNodeSettings localizer;
+  GpsBiasNodeParameters gps_bias;
+  int seed{1};  ///< of the localizer's random numbers, where it has some
+};
+
+/// Reads the files of --params in their order, later values over earlier ones, then --set and the other options. A file
+/// holds the localizer's parameters, or a section for each node, as localization.launch takes them (`imm_ekf:`,
+/// `gps_bias:`). Throws std::runtime_error, ParameterError where a name or a value is not known.
+ReplaySettings read_settings(const ReplayOptions& options, const LocalizerRegistry& localizers);
+
+}  // namespace urban_gnss
