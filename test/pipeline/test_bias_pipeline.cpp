@@ -98,7 +98,7 @@ TEST(BiasPipeline, TracksABiasThatGrows) {
   EXPECT_EQ(rig.pipeline.waiting_for(), "");
 }
 
-TEST(BiasPipeline, NothingBeforeTheDatumF17) {
+TEST(BiasPipeline, NothingBeforeTheDatum) {
   Rig rig("{}", false);
   EXPECT_EQ(rig.pipeline.waiting_for(), "gps/datum");
   rig.drive(0.0);
@@ -186,14 +186,14 @@ void expect_equal(const std::vector<BiasEstimate>& a, const std::vector<BiasEsti
   }
 }
 
-TEST(BiasPipeline, NonFiniteMessagesChangeNothingF25) {
+TEST(BiasPipeline, NonFiniteMessagesChangeNothing) {
   Rig clean, dirty;
   const auto expected = ordinary_run(clean, false);
   EXPECT_EQ(expected.size(), 21u);
   expect_equal(ordinary_run(dirty, true), expected);
 }
 
-TEST(BiasPipeline, ClockSetBackGivesTheSameRunAgainF21) {
+TEST(BiasPipeline, ClockSetBackGivesTheSameRunAgain) {
   Rig rig;
   const auto first = ordinary_run(rig, false);
   expect_equal(ordinary_run(rig, false), first);
@@ -223,7 +223,7 @@ TEST(BiasPipeline, AnOdometryGapStartsTheBiasAnew) {
   EXPECT_GT(after.covariance(0, 0), 2.0 * before.covariance(0, 0));
 }
 
-TEST(BiasPipeline, EveryParameterHasAnEffectF36) {
+TEST(BiasPipeline, EveryParameterHasAnEffect) {
   const auto trace = [](const std::string& yaml) {
     Rig rig(yaml);
     std::ostringstream out;

@@ -22,7 +22,7 @@ TEST(LocalizationPipeline, FixWaitsForTheOdometryOfItsStamp) {
   EXPECT_EQ(rig.pipeline.report().fixes_used, 1u);
 }
 
-TEST(LocalizationPipeline, LateFixIsComparedWithThePoseAtItsOwnStampF23) {
+TEST(LocalizationPipeline, LateFixIsComparedWithThePoseAtItsOwnStamp) {
   Rig rig(kGiven);
   rig.pipeline.set_antenna_offset({0.4, -0.3});
   for (int k = 0; k <= 40; ++k) rig.drive(0.1 * k);
@@ -98,7 +98,7 @@ TEST(LocalizationPipeline, BiasFromAnotherTimeDoesNotBlockTheOthers) {
   EXPECT_EQ(rig.fake->fixes[0].bias_radius_m, 3.0);
 }
 
-TEST(LocalizationPipeline, BiasOfBeforeTheClockWasSetBackIsForgottenF21) {
+TEST(LocalizationPipeline, BiasOfBeforeTheClockWasSetBackIsForgotten) {
   Rig rig(kGiven, true);
   rig.run(5.0, 6.0, false);
   rig.bias(7.0, 9.0);
@@ -130,7 +130,7 @@ TEST(LocalizationPipeline, BiasQueryPredictsTheAntennaAtTheFix) {
   EXPECT_LT((query->predicted_antenna_position - transform_point(base, {0.4, -0.3})).norm(), 1e-9);
 }
 
-TEST(LocalizationPipeline, NonFiniteMessagesChangeNothingF25) {
+TEST(LocalizationPipeline, NonFiniteMessagesChangeNothing) {
   const auto run = [](bool with_bad_ones) {
     Rig rig(kGiven);
     std::vector<LocalizationOutput> outputs;
@@ -175,7 +175,7 @@ TEST(LocalizationPipeline, NonFiniteMessagesChangeNothingF25) {
   }
 }
 
-TEST(LocalizationPipeline, NonFiniteCovarianceOrAltitudeIsReplacedF15) {
+TEST(LocalizationPipeline, NonFiniteCovarianceOrAltitudeIsReplaced) {
   Rig rig(kGiven);
   rig.drive(0.0);
   RawFix fix = raw_fix(Rig::at(0.5), {1.0, 2.0});
@@ -189,7 +189,7 @@ TEST(LocalizationPipeline, NonFiniteCovarianceOrAltitudeIsReplacedF15) {
   EXPECT_EQ(rig.pipeline.report().last_fix.decision, FixDecision::kInflated);
 }
 
-TEST(LocalizationPipeline, OutputStampsAscendF22) {
+TEST(LocalizationPipeline, OutputStampsAscend) {
   Rig rig(kGiven);
   const double times[] = {0.0, 0.1, 0.1, 0.05, 0.2, 0.2, 0.15, 0.3, 0.1, 0.4};
   for (const double time : times) {
@@ -206,7 +206,7 @@ TEST(LocalizationPipeline, OutputStampsAscendF22) {
   EXPECT_EQ(rig.fake->moves.size(), 4u);
 }
 
-TEST(LocalizationPipeline, StampsAscendAcrossAResetThatIsAskedForF22) {
+TEST(LocalizationPipeline, StampsAscendAcrossAResetThatIsAskedFor) {
   Rig rig(kGiven);
   rig.drive(0.0);
   rig.drive(5.0);
@@ -332,7 +332,7 @@ std::string trace(const std::string& base, const std::string& change, bool wants
   return out.str();
 }
 
-TEST(LocalizationPipeline, EveryParameterHasAnEffectF36) {
+TEST(LocalizationPipeline, EveryParameterHasAnEffect) {
   const std::string datum = "datum: [33.0, 130.0, 20.0]";
   const std::string given = kGiven;
   const std::string far_off = "{datum: [33.0, 130.0, 20.0], initial_pose: [150.0, 0.0, 0.0]}";
@@ -350,7 +350,7 @@ TEST(LocalizationPipeline, EveryParameterHasAnEffectF36) {
       {"lost_timeout", {far_off, "5.0"}},
       {"fix_timeout", {given, "3.0"}},
       {"bias_timeout", {given, "0.2"}},
-      {"satellites_timeout", {given, "0.2"}},
+      {"satellites_wait", {given, "0.2"}},
       {"time_jump", {given, "0.5"}},
       {"reset_on_time_jump", {given, "false"}},
       {"heading_converged_sigma", {given, "0.1"}},
@@ -380,8 +380,8 @@ TEST(LocalizationPipeline, ParametersAreChecked) {
   faults = faults_of(LocalizationParameters{});
   EXPECT_TRUE(faults.empty());
   LocalizationParameters parameters;
-  parameters.initial_pose = {1.0, 2.0};
-  parameters.antenna_offset = {1.0};
+  parameters.start.initial_pose = {1.0, 2.0};
+  parameters.input.antenna_offset = {1.0};
   parameters.datum.datum = {1.0};
   faults = faults_of(parameters);
   EXPECT_EQ(faults.size(), 3u);

@@ -3,7 +3,7 @@
 namespace urban_gnss {
 namespace {
 
-TEST(LocalizationPipeline, DatumComesFromAgreeingFixesWhichAreThenUsedF17) {
+TEST(LocalizationPipeline, DatumComesFromAgreeingFixesWhichAreThenUsed) {
   Rig rig("{}");
   for (int k = 0; k <= 3; ++k) {
     rig.fix(0.2 * k);
@@ -99,7 +99,7 @@ TEST(LocalizationPipeline, OdometryGapLosesThePlaceAndFindsItAgain) {
   EXPECT_TRUE(near(rig.pipeline.take_outputs().back().estimate.pose, Rig::truth(60.0), 1e-6));
 }
 
-TEST(LocalizationPipeline, FixesThatNoReflectionExplainsStartItAnewF3) {
+TEST(LocalizationPipeline, FixesThatNoReflectionExplainsStartItAnew) {
   Rig rig("{datum: [33.0, 130.0, 20.0], initial_pose: [150.0, 20.0, 2.0]}");
   rig.run(0.0, 9.9);
   EXPECT_EQ(rig.fake->starts.size(), 1u);
@@ -133,7 +133,7 @@ TEST(LocalizationPipeline, GivenPoseStartsWithTheDatum) {
   EXPECT_EQ(rig.pipeline.take_outputs().size(), 1u);
 }
 
-TEST(LocalizationPipeline, PoseThatIsSetStartsAnewF33) {
+TEST(LocalizationPipeline, PoseThatIsSetStartsAnew) {
   Rig rig(kGiven);
   rig.run(0.0, 2.0);
   rig.pipeline.set_pose(pose_with_sigma({100.0, 50.0, 1.0}, 2.0, 0.3));
@@ -188,7 +188,7 @@ TEST(LocalizationPipeline, DatumThatIsSetDuringTheStartLeavesNoOldFixes) {
   EXPECT_TRUE(near(rig.pipeline.take_outputs().back().estimate.pose, {truth.x - 3.0, truth.y + 2.0, truth.yaw}, 1e-3));
 }
 
-TEST(LocalizationPipeline, NonFiniteStateStartsAnewF25) {
+TEST(LocalizationPipeline, NonFiniteStateStartsAnew) {
   Rig rig(kGiven);
   rig.run(0.0, 5.0);
   rig.fake->breaks = true;

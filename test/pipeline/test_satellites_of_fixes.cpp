@@ -62,9 +62,9 @@ TEST(SatellitesOfFixes, AfterTheFixTheyAreWaitedForFromTheSecondOn) {
   }
 }
 
-TEST(SatellitesOfFixes, AreWaitedForAtMostTheTimeout) {
+TEST(SatellitesOfFixes, AreWaitedForAtMostSatellitesWait) {
   for (const double timeout : {0.3, 0.8}) {
-    SkyRig rig("satellites_timeout: " + std::to_string(timeout));
+    SkyRig rig("satellites_wait: " + std::to_string(timeout));
     rig.satellites(1.0);
     rig.fix(1.0);
     rig.drive(1.0);
@@ -86,7 +86,7 @@ TEST(SatellitesOfFixes, AreWaitedForAtMostTheTimeout) {
     rig.satellites(4.0);
     EXPECT_EQ(rig.last_mark(), 4);
   }
-  SkyRig never("satellites_timeout: 0.0");
+  SkyRig never("satellites_wait: 0.0");
   never.satellites(1.0);
   never.fix(1.0);
   never.drive(1.0);
@@ -95,9 +95,9 @@ TEST(SatellitesOfFixes, AreWaitedForAtMostTheTimeout) {
   EXPECT_EQ(never.taken(), 2u);
 }
 
-TEST(SatellitesOfFixes, TimeoutIsNotNegative) {
+TEST(SatellitesOfFixes, WaitIsNotNegative) {
   for (const auto& [value, fault_count] : {std::pair{"0.0", 0u}, {"-0.1", 1u}, {".nan", 1u}}) {
-    const YAML::Node map = YAML::Load(std::string("satellites_timeout: ") + value);
+    const YAML::Node map = YAML::Load(std::string("satellites_wait: ") + value);
     ParameterReader reader(map);
     LocalizationParameters parameters;
     reader.read(parameters);
