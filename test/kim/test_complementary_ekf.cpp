@@ -315,7 +315,7 @@ TEST(ComplementaryEkf, SpikeTouchesNothing) {
   }
 }
 
-// A jump of 40 m that the bias filter takes must not turn the robot (F8).
+// A jump of 40 m that the bias filter takes must not turn the robot.
 TEST(ComplementaryEkf, JumpDoesNotTurnTheRobot) {
   Drive drive(7);
   drive.run(60.0);

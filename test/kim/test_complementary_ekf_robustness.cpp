@@ -19,7 +19,7 @@ namespace {
 
 Eigen::Vector2d far_away(double) { return {80.0, 0.0}; }
 
-// Lock-out (F3): the estimate is 80 m off, every fix is rejected.
+// Lock-out: the estimate is 80 m off, every fix is rejected.
 TEST(ComplementaryEkfLockout, AutomaticStartsAnewAfterTheTimeOut) {
   for (const char* mode : {"gated", "compensated"}) {
     Drive drive(1, std::string("{lockout_timeout: 20.0, mode: ") + mode + "}");
@@ -84,7 +84,7 @@ TEST(ComplementaryEkfLockout, BiasThatNeverEndsIsGivenUp) {
   EXPECT_GT(open_for("dead_reckoning"), 95);
 }
 
-// A gate whose covariance grows while it rejects lets everything through in the end (F5).
+// A gate whose covariance grows while it rejects lets everything through in the end.
 TEST(ComplementaryEkfLockout, TestsDoNotWidenWhileFixesAreDoubted) {
   const auto smallest_after = [](const char* horizon) {
     Drive drive(5, std::string("{mode: gated, lockout_policy: dead_reckoning, detection_horizon: ") + horizon + "}");
@@ -97,7 +97,7 @@ TEST(ComplementaryEkfLockout, TestsDoNotWidenWhileFixesAreDoubted) {
   EXPECT_GT(smallest_after("1000.0"), 2.0 * smallest_after("10.0"));
 }
 
-// Parked, the fix drifts (F34): an error of 2.5 m and 30 s, declared as 3 m.
+// Parked, the fix drifts: an error of 2.5 m and 30 s, declared as 3 m.
 TEST(ComplementaryEkfParked, PoseDoesNotCreepAndSigmaStaysHonest) {
   constexpr int kSeeds = 40;
   double nees = 0.0;
@@ -191,7 +191,7 @@ TEST(ComplementaryEkfParked, RecordingDoesNotCreep) {
   EXPECT_GT(std::sqrt(outputs.back().estimate.covariance(0, 0)), 1.0) << "a parked receiver does not learn its bias";
 }
 
-// Encoders that say nothing while the robot drives: the estimate must not hold its place (F34).
+// Encoders that say nothing while the robot drives: the estimate must not hold its place.
 TEST(ComplementaryEkfParked, DeadEncoderIsNoStandstill) {
   Drive drive(6);
   drive.run(60.0);
@@ -262,7 +262,7 @@ std::string trace(const std::string& yaml) {
   return text.str();
 }
 
-// F36: every parameter has an effect.
+// Every parameter has an effect.
 TEST(ComplementaryEkfParameters, EachHasAnEffect) {
   const std::string reference = trace("{}");
   EXPECT_TRUE(trace("{}") == reference) << "the same input gives the same output";

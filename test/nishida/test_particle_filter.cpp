@@ -201,7 +201,7 @@ TEST(ParticleFilter, ConventionalGateRejectsAJumpThenRestartsOnItF3) {
   EXPECT_FALSE(is_rejected(verdict.decision));
   EXPECT_NE(verdict.reason, "");
   EXPECT_LT((filter.pose().position() - Eigen::Vector2d(300.0, 400.0)).norm(), 1.0);
-  EXPECT_NEAR(filter.pose().yaw, 1.0, 0.1);  // the heading is kept (F8)
+  EXPECT_NEAR(filter.pose().yaw, 1.0, 0.1);  // the heading is kept
 }
 
 TEST(ParticleFilter, LeverArmAndLatenessAreInTheAntennasPlace) {

@@ -9,7 +9,7 @@
 namespace urban_gnss {
 
 /// Weighted pose hypotheses as arrays: m, m, rad in [-pi, pi), log of the weight. Weights are kept as logarithms so
-/// that no product of likelihoods underflows (F30); `normalise` makes them sum to 1.
+/// that no product of likelihoods underflows; `normalise` makes them sum to 1.
 struct ParticleSet {
   std::vector<double> x;
   std::vector<double> y;

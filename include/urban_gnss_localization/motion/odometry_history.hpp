@@ -19,7 +19,7 @@ struct OdometrySample {
 std::string odometry_fault(const OdometrySample& sample);
 
 /// The dead-reckoned path of the last seconds, so that a fix can be compared with the robot's pose at the fix's own
-/// stamp (F23). The path is integrated from the twists and starts at the origin.
+/// stamp. The path is integrated from the twists and starts at the origin.
 class OdometryHistory {
  public:
   explicit OdometryHistory(double length_s = 10.0) : length_(from_seconds(length_s)) {}

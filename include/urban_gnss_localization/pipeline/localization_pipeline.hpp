@@ -159,7 +159,7 @@ class LocalizationPipeline {
   /// Sets the antenna's place in the base frame (m), e.g. as tf says it. Requires finite numbers.
   void set_antenna_offset(const Eigen::Vector2d& offset) { parameters_.antenna_offset = {offset.x(), offset.y()}; }
 
-  /// Forgets everything but parameters, a datum that was set and what the clocks said: stamps still ascend (F22).
+  /// Forgets everything but parameters, a datum that was set and what the clocks said: stamps still ascend.
   void reset(const std::string& why);
 
   /// What came of the messages since the last call.

@@ -285,7 +285,7 @@ void ComplementaryEkf::reject(const Innovation& innovation, FixVerdict& verdict)
 void ComplementaryEkf::restart_position(const Innovation& innovation) {
   close();
   ErrorCovariance covariance = filter_.compensated_covariance();
-  // As uncertain as the fix shows it to be wrong; heading and odometry errors are kept (F8).
+  // As uncertain as the fix shows it to be wrong; heading and odometry errors are kept.
   covariance.topLeftCorner<2, 2>() += innovation.value * innovation.value.transpose();
   filter_.set_state(ErrorState::Zero(), covariance);
   apply(innovation);

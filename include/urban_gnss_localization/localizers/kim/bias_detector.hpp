@@ -30,7 +30,7 @@ struct BiasDetection {
   double nis{0.0};       ///< normalised innovation squared, chi-squared with 2 degrees of freedom without a bias
   bool is_jump{false};   ///< the NIS is above its quantile
   bool is_ramp{false};   ///< the innovations have drifted in one direction
-  bool is_inert{false};  ///< the NIS runs so far below its expectation that the test cannot find anything (F4)
+  bool is_inert{false};  ///< the NIS runs so far below its expectation that the test cannot find anything
   bool is_biased() const { return is_jump || is_ramp; }
 };
 
@@ -38,7 +38,7 @@ struct BiasDetection {
 /// degrees of freedom; a horizontal fix has two.
 ///
 /// Beside the NIS of one fix it watches the run of innovations: two-sided CUSUMs (Page 1954) of their whitened
-/// components find a bias that grows slowly, each step of it below the gate (F6).
+/// components find a bias that grows slowly, each step of it below the gate.
 class BiasDetector {
  public:
   /// Requires parameters without faults.
@@ -68,7 +68,7 @@ double normalised_innovation_squared(const Eigen::Vector2d& innovation, const Ei
 /// The length (m) of a sudden bias that a gate at `gate_probability` finds at the first fix with probability `power`,
 /// in the direction in which it is hardest to find. `covariance` (m^2) is the innovation's: declared covariance of the
 /// fix plus that of the short-horizon prediction. A jump below this is likely to be fused before it is noticed; it then
-/// moves the estimate by its gain, and the CUSUM has to find it (F5). Throws std::invalid_argument unless both
+/// moves the estimate by its gain, and the CUSUM has to find it. Throws std::invalid_argument unless both
 /// probabilities are in (0, 1) and the covariance is positive definite.
 double smallest_detectable_jump(const Eigen::Matrix2d& covariance, double gate_probability, double power = 0.9);
 

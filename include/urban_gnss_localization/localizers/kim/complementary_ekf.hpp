@@ -20,7 +20,7 @@ enum class ComplementaryMode {
 };
 EnumNames<ComplementaryMode> enum_names(ComplementaryMode);
 
-/// What happens when the fixes contradict the estimate for long (F3).
+/// What happens when the fixes contradict the estimate for long.
 enum class LockoutPolicy {
   kAutomatic,      ///< after lockout_timeout the estimate is what is wrong: its position starts anew on the fixes
   kDeadReckoning,  ///< the odometry is believed until a fix agrees with it again, or a pose is set
@@ -38,7 +38,7 @@ struct ComplementaryEkfParameters {
   int close_count{5};              ///< count of fixes in a row with an insignificant bias after which the filter closes
   double detection_horizon{
       10.0};  ///< s of odometry after which the tests' covariance grows no more while fixes are doubted
-  /// s, correlation time of a fix's error while the robot stands: reflections change little then (F34)
+  /// s, correlation time of a fix's error while the robot stands: reflections change little then
   double parked_correlation_time{150.0};
   LockoutPolicy lockout_policy{LockoutPolicy::kAutomatic};
   double lockout_timeout{20.0};     ///< s of nothing but rejected fixes
@@ -110,7 +110,7 @@ class ComplementaryEkf : public Localizer {
   bool is_bias_open() const { return is_open_; }
   Eigen::Vector2d bias() const { return filter_.bias(); }
   Eigen::Matrix2d bias_covariance() const { return filter_.bias_covariance(); }
-  /// Whether the gate cannot find anything, as the NIS runs far below its expectation (F4).
+  /// Whether the gate cannot find anything, as the NIS runs far below its expectation.
   bool is_gate_inert() const { return is_inert_; }
   /// smallest_detectable_jump (m) at the last fix; 0 before the first.
   double smallest_detectable_jump_m() const;

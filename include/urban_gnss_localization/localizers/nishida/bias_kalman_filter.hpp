@@ -50,7 +50,7 @@ struct GpsBiasParameters {
   double bias_acceleration_density{0.3};  ///< m/s^2/sqrt(Hz), 0 as printed
   double bias_rate_sigma{3.0};            ///< m/s, initial standard deviation of the bias's rate
   double gate_probability{0.99};          ///< probability that a good fix passes the gate; 1 switches it off
-  double gate_timeout{5.0};               ///< s of nothing but rejections after which the filter starts anew (F3)
+  double gate_timeout{5.0};               ///< s of nothing but rejections after which the filter starts anew
   double shadow_probability{0.99};        ///< confidence at which a bias counts as significant
 
   template <class V>

@@ -10,7 +10,7 @@ namespace urban_gnss {
 /// Eq. (39): the number of equally weighted particles that say as much. Requires normalised weights.
 double effective_sample_size(const ParticleSet& particles);
 
-/// Eq. (35) with the mean angle taken on the circle (F31). Requires normalised weights.
+/// Eq. (35) with the mean angle taken on the circle. Requires normalised weights.
 Pose2 circular_mean(const ParticleSet& particles);
 
 /// Eq. (35) to the letter: the angles, as numbers in [-pi, pi), are averaged like lengths.
@@ -23,7 +23,7 @@ Eigen::Matrix3d covariance_about(const ParticleSet& particles, const Pose2& mean
 double circular_sigma(const ParticleSet& particles);
 
 /// Particles grouped by position: occupied cells of a grid that touch (also at a corner) belong together. O(N), without
-/// allocation after the first call (F32).
+/// allocation after the first call.
 class ParticleClusters {
  public:
   /// `cell_m` > 0: particles farther apart than two cells without others between are in different clusters.

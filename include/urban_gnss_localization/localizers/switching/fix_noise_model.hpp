@@ -19,7 +19,7 @@ struct FixNoiseModelParameters {
   double fix_covariance_weight{0.5};     ///< 0 to 1, how far the declared covariance's ups and downs are believed
   double fix_scale_limit{15.0};          ///< factor by which declared standard deviations may be wrong, either way
   double fix_correlation_time{3.0};      ///< s, over which the error of a fix stays the same; 0: independent errors
-  double parked_correlation_time{30.0};  ///< s, the same while the robot stands: reflections change little then (F34)
+  double parked_correlation_time{30.0};  ///< s, the same while the robot stands: reflections change little then
 
   template <class V>
   void visit(V& v) {
