@@ -262,7 +262,6 @@ std::string trace(const std::string& yaml) {
   return text.str();
 }
 
-// Every parameter has an effect.
 TEST(ComplementaryEkfParameters, EachHasAnEffect) {
   const std::string reference = trace("{}");
   EXPECT_TRUE(trace("{}") == reference) << "the same input gives the same output";
