@@ -66,7 +66,7 @@ OcclusionNode::OcclusionNode(ros::NodeHandle& node, ros::NodeHandle& private_nod
 
 OcclusionNode::~OcclusionNode() { fix_subscriber_.shutdown(); }  // fix_watch_ holds it too
 
-/// Nothing where tf does not know it (yet). Never waits (F24).
+/// Nothing where tf does not know it (yet). Never waits.
 std::optional<geometry_msgs::TransformStamped> OcclusionNode::look_up(const std::string& to, const std::string& from,
                                                                       const ros::Time& time) {
   try {
