@@ -29,38 +29,29 @@ NEEDED = ("gnss.csv", "odom.csv", "truth.csv", "meta.json")
 ESTIMATE = "odometry/filtered"
 RAW_FIX = "raw fix"
 
-# Name in the tables, and what replay is called with.
-METHODS = {
-    "EKF": ["--localizer", "complementary_ekf", "--set", "mode=standard"],
-    "gated EKF": ["--localizer", "complementary_ekf", "--set", "mode=gated"],
-    "complementary EKF": ["--localizer", "complementary_ekf"],
-    "UKF": ["--localizer", "ukf"],
-    "paper": ["--localizer", "particle_filter", "--set", "mode=paper"],
-    "IMM": ["--localizer", "imm_ekf"],
-    "switching": ["--localizer", "particle_filter", "--set", "mode=switching"],
-}
-COLOURS = {"EKF": "#e69f00", "gated EKF": "#843c39", "complementary EKF": "#d55e00", "UKF": "#7b4fd6",
-           "paper": "#0072b2", "IMM": "#56b4e9", "switching": "#009e73", RAW_FIX: common.FIX_COLOUR}
+COLOURS = {"ekf": "#e69f00", "gated_ekf": "#843c39", "complementary_ekf": "#d55e00", "ukf": "#7b4fd6",
+           "paper": "#0072b2", "imm_ekf": "#56b4e9", "switching": "#009e73", RAW_FIX: common.FIX_COLOUR}
 
 # What an information is worth: the method that does best without it.
-ABLATED = "IMM"
+ABLATED = "imm_ekf"
 ABLATIONS = {
-    "odometry errors as states": ["speed_scale_sigma=0.0", "speed_scale_walk=0.0", "yaw_rate_bias_sigma=0.0",
-                                  "yaw_rate_bias_walk=0.0"],
-    "formal covariance": ["use_fix_covariance=false", "direct_sigma=10.0", "shadow_sigma=10.0"],
-    "half belief in its ups and downs": ["fix_covariance_weight=1.0"],
-    "learnt scale": ["fix_scale_rate=0.0"],
-    "formal covariance, learnt scale": ["use_fix_covariance=false", "direct_sigma=10.0", "shadow_sigma=10.0",
-                                        "fix_scale_rate=0.0"],
-    "ranges of the fix": ["use_ranges=false"],
-    "velocity of the receiver": ["use_gps_velocity=false"],
-    "heavy tails of the velocity": ["velocity_dof=1.0e+9"],
-    "correlation of errors": ["fix_correlation_time=0.0", "parked_correlation_time=0.0"],
-    "more of it when parked": ["parked_correlation_time=3.0"],
-    "heavy tails": ["student_dof=1.0e+9"],
-    "outliers": ["outlier_share=0.0"],
-    "heavy tails, outliers": ["student_dof=1.0e+9", "outlier_share=0.0"],
-    "biased modes": ["direct_time=1.0e+15"],
+    "odometry errors as states": ["speed_scale_sigma=0.0", "expert.odometry.speed_scale_walk=0.0",
+                                  "expert.odometry.yaw_rate_bias_sigma=0.0", "expert.odometry.yaw_rate_bias_walk=0.0"],
+    "formal covariance": ["use_fix_covariance=false", "direct_sigma=10.0", "expert.shadow_sigma=10.0"],
+    "half belief in its ups and downs": ["expert.fix_noise.fix_covariance_weight=1.0"],
+    "learnt scale": ["expert.fix_noise.fix_scale_rate=0.0"],
+    "formal covariance, learnt scale": ["use_fix_covariance=false", "direct_sigma=10.0", "expert.shadow_sigma=10.0",
+                                        "expert.fix_noise.fix_scale_rate=0.0"],
+    "ranges of the fix": ["expert.ranges.use_ranges=false"],
+    "velocity of the receiver": ["expert.velocity.use_gps_velocity=false"],
+    "heavy tails of the velocity": ["expert.velocity_noise.velocity_dof=1.0e+9"],
+    "correlation of errors": ["expert.fix_noise.fix_correlation_time=0.0",
+                              "expert.fix_noise.parked_correlation_time=0.0"],
+    "more of it when parked": ["expert.fix_noise.parked_correlation_time=3.0"],
+    "heavy tails": ["expert.bias.student_dof=1.0e+9"],
+    "outliers": ["expert.bias.outlier_share=0.0"],
+    "heavy tails, outliers": ["expert.bias.student_dof=1.0e+9", "expert.bias.outlier_share=0.0"],
+    "biased modes": ["expert.bias.direct_time=1.0e+15"],
 }
 
 DIVERGED_M = 100.0
@@ -106,7 +97,7 @@ def program(name):
 
 
 def call(*command):
-    """Run a program; a failure ends everything with its last line."""
+    """Run a program and give its output; a failure ends everything with its last line."""
     try:
         done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, universal_newlines=True)
     except OSError as error:
@@ -114,6 +105,12 @@ def call(*command):
     if done.returncode != 0:
         lines = (done.stderr.strip() or done.stdout.strip() or "failed without a word").splitlines()
         raise common.ReportError("{}: {}".format(os.path.basename(command[0]), lines[-1]))
+    return done.stdout
+
+
+def find_variants():
+    """The names under which the registry's localizers are compared."""
+    return call(*program("replay"), "--list-variants").split()
 
 
 def find_recordings(directory, chosen):
@@ -283,10 +280,10 @@ def ablate(results):
 def compare(options):
     """Run everything; gives the path of the page."""
     recordings = find_recordings(options.data, options.recordings)
-    methods = {name: METHODS[name] for name in options.methods or METHODS}
+    methods = {name: ["--localizer", name] for name in options.methods or find_variants()}
     if options.ablation:
-        methods = {ABLATED: METHODS[ABLATED]}
-        methods.update({name: METHODS[ABLATED] + [part for text in changes for part in ("--set", text)]
+        methods = {ABLATED: ["--localizer", ABLATED]}
+        methods.update({name: ["--localizer", ABLATED] + [part for text in changes for part in ("--set", text)]
                         for name, changes in ABLATIONS.items()})
     overrides = [part for text in options.overrides for part in ("--set", text)]
     results, tracks = {}, {}
@@ -332,7 +329,7 @@ def main():
     parser.add_argument("--data", default=os.environ.get("URBAN_GNSS_DATA"), help="default: $URBAN_GNSS_DATA")
     parser.add_argument("--docs", help="Markdown file whose tables are renewed, e.g. docs/results/recordings.md")
     parser.add_argument("--recordings", nargs="+", default=[], help="default: all with truth")
-    parser.add_argument("--methods", nargs="+", choices=list(METHODS), help="default: all")
+    parser.add_argument("--methods", nargs="+", help="names of replay --list-variants; default: all")
     parser.add_argument("--ablation", action="store_true", help="the recommended localizer without each of its "
                         "sources of information, instead of all localizers")
     parser.add_argument("--set", action="append", default=[], dest="overrides", metavar="NAME=VALUE",

@@ -46,6 +46,9 @@ class GpsBiasNode {
  private:
   BiasPipelineParameters read(const ros::NodeHandle& private_node) {
     GpsBiasNodeParameters parameters;
+    if (private_node.getParam("localizer", parameters.localizer) && !parameters.localizer.empty()) {
+      read_known_parameters(ros::NodeHandle(parameters.localizer), parameters.frames, parameters.bias.input);
+    }
     read_private_parameters(private_node, parameters);
     frames_ = parameters.frames;
     return parameters.bias;

@@ -1,7 +1,7 @@
 #include "urban_gnss_localization/pipeline/velocity_queue.hpp"
 
 #include "limits.hpp"
-#include "urban_gnss_localization/localizers/maier/unscented.hpp"
+#include "urban_gnss_localization/common/positive_definite.hpp"
 
 namespace urban_gnss {
 namespace {

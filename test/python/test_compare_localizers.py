@@ -93,7 +93,7 @@ class ProgramTest(unittest.TestCase):
         docs = os.path.join(self.directory, "real_data.md")
         with open(docs, "w") as file:
             file.write("# Real\n<!-- comparison -->\n<!-- end of comparison -->\n")
-        done = self.run_script("--methods", "EKF", "switching", "--docs", docs)
+        done = self.run_script("--methods", "ekf", "switching", "--docs", docs)
         self.assertEqual(done.returncode, 0, done.stderr)
         with open(os.path.join(self.directory, "out", "report.html"), encoding="utf-8") as file:
             page = file.read()

@@ -111,10 +111,10 @@ class ToolTest(unittest.TestCase):
 
     def test_paper_experiment_refuses(self):
         self.assertIn("no such method", self.refuse("paper_experiment", "--methods", "papers"))
-        output = self.refuse("paper_experiment", "--set", "particle_filter.ring_share=2", "--set",
-                             "gps_bias.shadow_sigm=1")
-        self.assertIn("particle_filter.ring_share = 2", output)
-        self.assertIn("did you mean shadow_sigma?", output)
+        output = self.refuse("paper_experiment", "--set", "particle_filter.expert.ring_share=2", "--set",
+                             "gps_bias.expert.bias_filter.shadow_sigm=1")
+        self.assertIn("particle_filter.expert.ring_share = 2", output)
+        self.assertIn("did you mean gps_bias.expert.bias_filter.shadow_sigma?", output)
 
     def test_recording_through_all_tools(self):
         write_recording(self.directory)
@@ -152,8 +152,8 @@ class ToolTest(unittest.TestCase):
         with open(self.path("odom.csv"), "w") as file:
             file.writelines(lines[:1] + lines[16::20])  # every 2 s, between the fixes
         self.succeed("csv_to_bag", self.directory, self.path("in.bag"))
-        self.succeed("replay", self.path("in.bag"), "--set", "odometry_gap=5.0", "--set",
-                     "initial_pose=[0.0, 0.0, 0.0]", "--output", self.path("out.bag"), "--json", self.path("out.json"))
+        self.succeed("replay", self.path("in.bag"), "--set", "expert.stamps.odometry_gap=5.0", "--set",
+                     "expert.start.initial_pose=[0.0, 0.0, 0.0]", "--output", self.path("out.bag"), "--json", self.path("out.json"))
         with rosbag.Bag(self.path("out.bag")) as bag:
             stamps = [status.last_fix.stamp for _, status, _ in bag.read_messages("/status")]
         with open(self.path("out.json")) as file:
@@ -169,10 +169,32 @@ class ToolTest(unittest.TestCase):
         self.assertIn("on sky (--satellites-topic)", self.refuse("replay", self.path("in.bag"), "--satellites-topic", "sky"))
         self.assertIn("no such localizer", self.refuse("replay", self.path("in.bag"), "--localizer", "magic"))
         self.assertIn("no such bag", self.refuse("replay", self.path("absent.bag")))
-        output = self.refuse("replay", self.path("in.bag"), *RANDOM, "--set", "particle_count=0", "--set", "ring_shar=0.1")
+        output = self.refuse("replay", self.path("in.bag"), *RANDOM, "--set", "expert.particle_count=0",
+                             "--set", "expert.ring_shar=0.1", "--set", "gate_timeout=1")
         self.assertIn("particle_count = 0", output)
-        self.assertIn("did you mean ring_share?", output)
+        self.assertIn("did you mean expert.ring_share?", output)
+        self.assertIn("gate_timeout: no such parameter; it is expert.gate_timeout", output)
         self.assertIn("must be sensor_msgs/NavSatFix", self.refuse("replay", self.path("in.bag"), "--fix-topic", "tf"))
+
+    def test_a_localizer_is_one_line_of_the_registry(self):
+        """A dummy that nothing but its own file and one line knows: named, told, run and compared like the others."""
+        write_recording(self.directory)
+        self.succeed("csv_to_bag", self.directory, self.path("in.bag"))
+        dummy = os.path.join(os.environ["URBAN_GNSS_TEST_PROGRAMS"], "replay_with_dummy")
+        self.assertIn("dummy", self.succeed(dummy, "--list-variants").split())
+        self.succeed(dummy, self.path("in.bag"), "--localizer", "dummy", "--set", "start_sigma=5.0", "--output",
+                     self.path("out.bag"), "--json", self.path("out.json"))
+        with open(self.path("out.json")) as file:
+            result = json.load(file)
+        self.assertEqual(result["localizer"], "dummy")
+        self.assertGreater(result["estimates"], 300)
+        self.assertLess(result["errors"]["position_m"]["median"], 5.0)
+        with rosbag.Bag(self.path("out.bag")) as bag:
+            covariances = {message.pose.covariance[0] for _, message, _ in bag.read_messages("/odometry/filtered")}
+        self.assertEqual(covariances, {25.0})
+        self.assertIn("start_sigma = -1", self.refuse(dummy, self.path("in.bag"), "--localizer", "dummy", "--set",
+                                                      "start_sigma=-1"))
+        self.assertIn("no such localizer", self.refuse("replay", self.path("in.bag"), "--localizer", "dummy"))
 
     def test_csv_to_bag_refuses(self):
         write_recording(self.directory)

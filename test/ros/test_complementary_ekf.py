@@ -86,7 +86,7 @@ class ComplementaryEkfTest(unittest.TestCase):
 
     def test_bad_parameters_stop_the_node_with_all_faults(self):
         done = subprocess.run(["rosrun", "urban_gnss_localization", "complementary_ekf_node", "__name:=tested", "_mode:=bold",
-                               "_gate_probability:=1.5", "_close_coun:=3"], stdout=subprocess.PIPE,
+                               "_expert/detector/gate_probability:=1.5", "_expert/close_coun:=3"], stdout=subprocess.PIPE,
                               stderr=subprocess.STDOUT, universal_newlines=True, timeout=30)
         self.assertEqual(done.returncode, 1, done.stdout)
         for fault in ("standard, gated, compensated", "gate_probability = 1.5", "did you mean close_count?"):

@@ -11,15 +11,19 @@ import rospy
 import rostest
 
 NODES = {
-    "particle_filter_node": (["_ring_share:=2.0", "_particle_count:=0", "_modus:=paper", "_mode:=papers"],
+    "particle_filter_node": (["_expert/ring_share:=2.0", "_expert/particle_count:=0", "_modus:=paper", "_mode:=papers"],
                              ["ring_share = 2", "particle_count = 0", "did you mean mode?", "literal, paper, conventional"]),
-    "imm_ekf_node": (["_jump_share:=2.0", "_mode:=switching", "_fast_bias_time:=0.0"],
-                     ["jump_share = 2", "mode: no such parameter", "fast_bias_time = 0"]),
-    "gps_bias_node": (["_shadow_sigma:=-1.0", "_bias_input:=residuals", "_gate:=0.5"],
+    "switching_particle_filter_node": (["_expert/merge_distance:=-1.0", "_seed:=2", "_expert/ranges/range_sigma_min:=9.0"],
+                                       ["merge_distance = -1", "seed: no such parameter; it is expert.seed",
+                                        "range_sigma_min"]),
+    "imm_ekf_node": (["_expert/bias/jump_share:=2.0", "_mode:=switching", "_fast_bias_time:=1.0"],
+                     ["jump_share = 2", "mode: no such parameter", "it is expert.bias.fast_bias_time"]),
+    "ukf_node": (["_outliers:=all", "_expert/ukf_alpha:=0.0"], ["student_t, gate, none", "ukf_alpha = 0"]),
+    "gps_bias_node": (["_expert/bias_filter/shadow_sigma:=-1.0", "_expert/bias_filter/bias_input:=residuals", "_gate:=0.5"],
                       ["shadow_sigma = -1", "residual, position", "gate: no such parameter"]),
-    "occlusion_node": (["_voxel_size:=-1.0", "_model:=best", "_windw:=3.0"],
-                       ["voxel_size = -1", "conventional, paper, soft", "did you mean window?"]),
-    "simulator_node": (["_target_count:=1", "_interval:=0.0", "_datum:=[95.0, 0.0, 0.0]"],
+    "occlusion_node": (["_expert/voxels/voxel_size:=-1.0", "_model:=best", "_modl:=soft"],
+                       ["voxel_size = -1", "conventional, paper, soft", "did you mean model?"]),
+    "simulator_node": (["_expert/target_count:=1", "_expert/interval:=0.0", "_datum:=[95.0, 0.0, 0.0]"],
                        ["target_count = 1", "interval = 0", "datum"]),
     "waypoint_controller_node": (["_speed:=fast", "_targets:=[1.0, 2.0, 3.0]"],
                                  ["speed = fast: must be a number", "targets"]),
@@ -67,7 +71,7 @@ class NodesTest(unittest.TestCase):
     def test_interrupt_ends_the_node_cleanly(self):
         for node in NODES:
             with self.subTest(node=node):
-                process = subprocess.Popen(command(node, "_publish_clock:=false") if node == "simulator_node"
+                process = subprocess.Popen(command(node, "_expert/publish_clock:=false") if node == "simulator_node"
                                            else command(node), start_new_session=True, stdout=subprocess.PIPE,
                                            stderr=subprocess.STDOUT, universal_newlines=True)
                 self.addCleanup(process.kill)

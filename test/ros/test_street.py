@@ -169,7 +169,7 @@ class StreetTest(unittest.TestCase):
             self.feed(5, cloud=WALL)  # the other nodelet, and with it the manager, is alive
 
     def test_05_bad_parameters_leave_the_manager_alone(self):
-        process = self.loader("/bad", "_voxel_size:=-1.0", "_model:=best", "_windw:=3.0")
+        process = self.loader("/bad", "_expert/voxels/voxel_size:=-1.0", "_model:=best", "_windw:=3.0")
         output, _ = process.communicate(timeout=30)
         self.assertNotEqual(process.returncode, 0, output)
         for fault in ("voxel_size = -1", "conventional", "did you mean window?"):

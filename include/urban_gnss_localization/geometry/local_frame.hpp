@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "urban_gnss_localization/gnss/fix.hpp"
+#include "urban_gnss_localization/geometry/geodetic_position.hpp"
 
 namespace urban_gnss {
 

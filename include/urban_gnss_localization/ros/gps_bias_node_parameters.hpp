@@ -1,16 +1,22 @@
 #pragma once
 
+#include <string>
+
 #include "urban_gnss_localization/pipeline/bias_pipeline.hpp"
 #include "urban_gnss_localization/ros/conversions.hpp"
 
 namespace urban_gnss {
 
-/// Parameters of gps_bias_node. What it shares with the localizer (InputParameters) has the same names there.
+/// Parameters of gps_bias_node. What it shares with the localizer, frames and InputParameters, is taken from the
+/// parameters of the node `localizer` where it is not given here.
 struct GpsBiasNodeParameters {
+  std::string localizer;
   Frames frames;
   BiasPipelineParameters bias;
 
   void visit(ParameterVisitor& v) {
+    v.basic()("localizer", localizer,
+              "name of the localizer's node, whose frames, antenna and belief in fixes count here; empty: the defaults");
     v.include(frames);
     v.include(bias);
   }

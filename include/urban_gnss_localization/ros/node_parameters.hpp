@@ -26,6 +26,14 @@ void read_private_parameters(const ros::NodeHandle& private_node, P&... paramete
   finish_reading(private_node, reader);
 }
 
+/// Reads structs out of another node's parameters, most of which are not its own: what they do not know is left out,
+/// and bad values are that node's to refuse.
+template <class... P>
+void read_known_parameters(const ros::NodeHandle& other_node, P&... parameters) {
+  ParameterReader reader(private_parameters(other_node), "", "", Layout::kTiered);
+  (reader.read(parameters), ...);
+}
+
 /// The main function of a node: initialises ROS, makes the node, spins. A node whose parameters are bad, or that fails
 /// otherwise while it is made, says why on the console and exits with 1.
 int run_node(int argc, char** argv, const std::string& name,

@@ -1,0 +1,67 @@
+"""The installed tree by itself: sourced alone, in an empty environment and folder, it runs replay and the demo, and
+names nothing of the source or build tree. URBAN_GNSS_INSTALL names it; URBAN_GNSS_SOURCE and URBAN_GNSS_BUILD the others."""
+import glob
+import json
+import os
+import subprocess
+import tempfile
+import unittest
+
+INSTALL = os.environ["URBAN_GNSS_INSTALL"]
+FORBIDDEN = [os.environ["URBAN_GNSS_SOURCE"], os.environ["URBAN_GNSS_BUILD"]]
+PACKAGE = "urban_gnss_localization"
+
+
+class InstalledTreeTest(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.directory = folder.name
+
+    def run_installed(self, command, seconds=120):
+        environment = {"HOME": self.directory, "PATH": "/usr/bin:/bin", "LANG": "C.UTF-8", "ROS_HOME": self.directory,
+                       "ROS_HOSTNAME": "localhost"}
+        ros = "/opt/ros/noetic/setup.bash"
+        source = ". {} && ".format(ros) if os.path.exists(ros) else ""
+        done = subprocess.run(["bash", "-c", source + ". {}/setup.bash && ".format(INSTALL) + command],
+                              stdout=subprocess.PIPE, stderr=subprocess.STDOUT, universal_newlines=True,
+                              env=environment, cwd=self.directory, timeout=seconds)
+        self.assertEqual(done.returncode, 0, command + "\n" + done.stdout)
+        return done.stdout
+
+    def test_the_package_is_found_in_the_installed_tree(self):
+        self.assertEqual(self.run_installed("rospack find " + PACKAGE).strip(), os.path.join(INSTALL, "share", PACKAGE))
+
+    def test_simulate_replay_evaluate(self):
+        rosrun = "rosrun {} ".format(PACKAGE)
+        self.run_installed(rosrun + "simulate --scenario open_sky --duration 60 --without-lidar --output drive.bag")
+        self.run_installed(rosrun + "replay drive.bag --output out.bag --json out.json")
+        with open(os.path.join(self.directory, "out.json")) as file:
+            self.assertLess(json.load(file)["errors"]["position_m"]["median"], 5.0)
+        self.run_installed(rosrun + "evaluate out.bag --truth drive.bag --output results")
+        self.assertTrue(glob.glob(os.path.join(self.directory, "results", "*.png")), "the reports' scripts are installed")
+
+    def test_the_demo_runs(self):
+        """The live graph of the paper's field, until the filter has published some poses."""
+        self.run_installed("roslaunch -p 11399 {} demo.launch rviz:=false real_time_factor:=2 > log 2>&1 & launch=$!; "
+                           "export ROS_MASTER_URI=http://localhost:11399; "
+                           "timeout 60 bash -c 'until rostopic list > topics 2> /dev/null; do sleep 0.5; done; "
+                           "rostopic echo -n 20 /odometry/filtered > poses'; status=$?; "
+                           "kill -INT $launch; wait $launch; exit $status".format(PACKAGE))
+        with open(os.path.join(self.directory, "poses")) as file:
+            self.assertEqual(file.read().count("child_frame_id"), 20)
+
+    def test_nothing_names_the_source_or_build_tree(self):
+        named = []
+        for folder, _, names in os.walk(INSTALL):
+            for name in names:
+                path = os.path.join(folder, name)
+                with open(path, "rb") as file:
+                    content = file.read()
+                named += [path for tree in FORBIDDEN if os.fsencode(tree) + b"/" in content.replace(
+                    os.fsencode(INSTALL), b"") and not os.path.islink(path)]
+        self.assertEqual(named, [])
+
+
+if __name__ == "__main__":
+    unittest.main()
