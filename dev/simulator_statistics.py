@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""How the simulated receiver does in the scenarios, over several seeds, as the tables of docs/simulator.md.
+"""How the simulated receiver does in the scenarios, over several seeds, as the tables of docs/results/simulation.md.
 
 The workspace must be sourced, or URBAN_GNSS_PROGRAMS be the folder of the built programs.
 """

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Every localizer on every real recording: tables, plots and the tables of docs/real_data.md.
+"""Every localizer on every real recording: tables, plots and the tables of docs/results/recordings.md.
 
 usage: compare_localizers.py OUTPUT [--data DIR] [--docs FILE] [options]
 
@@ -330,7 +330,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("output", help="folder for bags, runs, figures and the report")
     parser.add_argument("--data", default=os.environ.get("URBAN_GNSS_DATA"), help="default: $URBAN_GNSS_DATA")
-    parser.add_argument("--docs", help="Markdown file whose tables are renewed, e.g. docs/real_data.md")
+    parser.add_argument("--docs", help="Markdown file whose tables are renewed, e.g. docs/results/recordings.md")
     parser.add_argument("--recordings", nargs="+", default=[], help="default: all with truth")
     parser.add_argument("--methods", nargs="+", choices=list(METHODS), help="default: all")
     parser.add_argument("--ablation", action="store_true", help="the recommended localizer without each of its "

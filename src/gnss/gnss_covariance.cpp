@@ -116,7 +116,7 @@ std::vector<RangingSatellite> ranging(const std::vector<SatelliteObservation>& s
   return result;
 }
 
-/// A fix's error, of which the header derives C.
+/// A fix's error, by which docs/methods/maier.md derives C.
 struct SoftError {
   Eigen::Vector2d mean;
   Eigen::Matrix2d covariance;  ///< about the mean

@@ -1,5 +1,5 @@
 // The bias Kalman filter of Nishida et al. as a node: gps/fix, odom, odometry/filtered and gps/datum in, gps/bias out.
-// Parameters: BiasPipelineParameters, Frames; config/gps_bias.yaml documents each.
+// Parameters: GpsBiasNodeParameters (docs/parameters.md).
 
 #include <diagnostic_updater/diagnostic_updater.h>
 #include <nav_msgs/Odometry.h>
@@ -9,9 +9,9 @@
 
 #include <cmath>
 
-#include "urban_gnss_localization/pipeline/bias_pipeline.hpp"
 #include "urban_gnss_localization/ros/conversions.hpp"
 #include "urban_gnss_localization/ros/event_log.hpp"
+#include "urban_gnss_localization/ros/gps_bias_node_parameters.hpp"
 #include "urban_gnss_localization/ros/markers.hpp"
 #include "urban_gnss_localization/ros/node_parameters.hpp"
 #include "urban_gnss_localization/ros/topics.hpp"
@@ -45,9 +45,10 @@ class GpsBiasNode {
 
  private:
   BiasPipelineParameters read(const ros::NodeHandle& private_node) {
-    BiasPipelineParameters parameters;
-    read_private_parameters(private_node, frames_, parameters);
-    return parameters;
+    GpsBiasNodeParameters parameters;
+    read_private_parameters(private_node, parameters);
+    frames_ = parameters.frames;
+    return parameters.bias;
   }
 
   void on_datum(const sensor_msgs::NavSatFix& message) {

@@ -6,29 +6,18 @@
 #include <nav_msgs/Path.h>
 #include <ros/ros.h>
 
-#include "urban_gnss_localization/control/waypoint_controller.hpp"
 #include "urban_gnss_localization/pipeline/stamp_monitor.hpp"
 #include "urban_gnss_localization/ros/conversions.hpp"
 #include "urban_gnss_localization/ros/markers.hpp"
 #include "urban_gnss_localization/ros/node_parameters.hpp"
 #include "urban_gnss_localization/ros/topics.hpp"
+#include "urban_gnss_localization/ros/waypoint_controller_node_parameters.hpp"
 
 using namespace urban_gnss;
 
 namespace {
 
 constexpr double kTimeJump_s = 1.0;
-
-struct NodeParameters {
-  int first_target{0};
-  double estimate_timeout{0.5};
-
-  void visit(ParameterVisitor& v) {
-    v.basic()("first_target", first_target, non_negative(), "", "index of the target to steer for first");
-    v.basic()("estimate_timeout", estimate_timeout, positive(), "s",
-      "of wall time without an estimate after which the robot is stopped");
-  }
-};
 
 class WaypointControllerNode {
  public:
@@ -46,8 +35,8 @@ class WaypointControllerNode {
 
  private:
   WaypointController read(const ros::NodeHandle& private_node) {
-    read_private_parameters(private_node, steering_, parameters_);
-    return WaypointController(steering_, static_cast<std::size_t>(parameters_.first_target));
+    read_private_parameters(private_node, parameters_);
+    return WaypointController(parameters_.steering, static_cast<std::size_t>(parameters_.first_target));
   }
 
   void on_estimate(const nav_msgs::Odometry& message) {
@@ -56,7 +45,7 @@ class WaypointControllerNode {
     if (!is_finite(estimate)) return;
     const bool is_new = stamps_.accept(stamp, [this](Stamp) {
       ROS_WARN_STREAM("reset: the clock of the estimate jumped back");
-      controller_ = WaypointController(steering_, static_cast<std::size_t>(parameters_.first_target));
+      controller_ = WaypointController(parameters_.steering, static_cast<std::size_t>(parameters_.first_target));
       shown_.reset();
       return true;
     });
@@ -65,7 +54,7 @@ class WaypointControllerNode {
     const BicycleInput input = controller_.steer(estimate);
     geometry_msgs::Twist command;
     command.linear.x = input.speed_mps;
-    command.angular.z = yaw_rate(input, steering_.wheelbase);
+    command.angular.z = yaw_rate(input, parameters_.steering.wheelbase);
     command_publisher_.publish(command);
     is_driving_ = true;
     seen_since_check_ = true;
@@ -98,8 +87,7 @@ class WaypointControllerNode {
     seen_since_check_ = false;
   }
 
-  WaypointControllerParameters steering_;
-  NodeParameters parameters_;
+  WaypointControllerNodeParameters parameters_;
   WaypointController controller_;
   StampMonitor stamps_;
   std::optional<std::size_t> shown_;

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <sstream>
+#include <utility>
 
 #include "pcl_cloud.hpp"
 
@@ -36,6 +37,54 @@ std::vector<int> free_axes(AlignmentFreedom freedom) {
   return {0, 1, 2, 3, 4, 5};
 }
 
+/// The scan as it is aligned.
+struct Source {
+  PointCloud points;
+  Eigen::Vector3d middle{Eigen::Vector3d::Zero()};
+  double lever_m{1.0};  ///< RMS distance of the points from their middle, at least 1
+};
+
+/// `count` of the points at most, evenly chosen.
+PointCloud thinned(PointCloud points, std::size_t count) {
+  if (points.size() <= count) return points;
+  PointCloud chosen;
+  for (std::size_t i = 0; i < count; ++i) chosen.push_back(points[i * points.size() / count]);
+  return chosen;
+}
+
+Source source_of(PointCloud points) {
+  Source source;
+  source.points = std::move(points);
+  const auto count = static_cast<double>(source.points.size());
+  for (const Eigen::Vector3f& point : source.points) source.middle += point.cast<double>();
+  source.middle /= count;
+  double squares_m2 = 0.0;
+  for (const Eigen::Vector3f& point : source.points) squares_m2 += (point.cast<double>() - source.middle).squaredNorm();
+  source.lever_m = std::max(1.0, std::sqrt(squares_m2 / count));
+  return source;
+}
+
+/// How far a point may be from the map (m) to count, and from its plane to count in full.
+struct Tolerance {
+  double near_m;
+  double inlier_m;
+};
+
+/// That of iteration `i`, by how far the iterations have come: wide at first, that of the verdict at the end.
+struct Schedule {
+  const ScanAlignerParameters& parameters;
+
+  double progress(int i) const {
+    return parameters.max_iterations > 1 ? static_cast<double>(i) / (parameters.max_iterations - 1) : 1.0;
+  }
+  Tolerance tolerance(int i) const {
+    const auto& p = parameters;
+    const double shrink = std::pow(p.final_distance / p.max_distance, progress(i));
+    return {p.max_distance * shrink, p.inlier_distance / p.final_distance * p.max_distance * shrink};
+  }
+  Tolerance final() const { return {parameters.final_distance, parameters.inlier_distance}; }
+};
+
 Eigen::MatrixXd selected(const Matrix6& matrix, const std::vector<int>& axes) {
   const auto size = static_cast<Eigen::Index>(axes.size());
   Eigen::MatrixXd result(size, size);
@@ -45,6 +94,74 @@ Eigen::MatrixXd selected(const Matrix6& matrix, const std::vector<int>& axes) {
     }
   }
   return result;
+}
+
+/// The step of Gauss and Newton along the axes.
+Vector6 solve(const Constraints& constraints, const std::vector<int>& axes) {
+  // A trace of damping: without it a direction that is not constrained would be moved in at random.
+  Eigen::MatrixXd information = selected(constraints.information, axes);
+  information.diagonal().array() += 1e-6 * information.trace() + 1e-9;
+  Eigen::VectorXd gradient(information.rows());
+  for (std::size_t k = 0; k < axes.size(); ++k) gradient[static_cast<Eigen::Index>(k)] = constraints.gradient[axes[k]];
+  const Eigen::VectorXd solution = -information.ldlt().solve(gradient);
+  Vector6 step = Vector6::Zero();
+  for (std::size_t k = 0; k < axes.size(); ++k) step[axes[k]] = solution[static_cast<Eigen::Index>(k)];
+  return step;
+}
+
+/// The pose after a step, which turns about the scan's middle.
+Eigen::Isometry3d moved_by(const Vector6& step, const Eigen::Isometry3d& pose, const Source& source) {
+  const Eigen::Vector3d rotation = step.head<3>() / source.lever_m;
+  const Eigen::Vector3d pivot = pose * source.middle;
+  const double angle = rotation.norm();
+  Eigen::Isometry3d change = Eigen::Isometry3d::Identity();
+  change.translate(pivot + step.tail<3>());
+  if (angle > 0.0) change.rotate(Eigen::AngleAxisd(angle, rotation / angle));
+  change.translate(-pivot);
+  return change * pose;
+}
+
+/// Least share of the constraint in any direction along the axes.
+double conditioning_of(const Constraints& constraints, const std::vector<int>& axes) {
+  const Eigen::MatrixXd information = selected(constraints.information, axes);
+  const double trace = information.trace();
+  if (!(trace > 0.0)) return 0.0;
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(information, Eigen::EigenvaluesOnly);
+  return std::max(0.0, solver.eigenvalues()[0]) / trace;
+}
+
+Alignment refused(Alignment alignment, const Eigen::Isometry3d& guess, AlignmentDecision decision, double figure,
+                  const char* relation, double limit) {
+  std::ostringstream reason;
+  reason << enum_name(decision) << ": " << figure << ' ' << relation << ' ' << limit;
+  alignment.decision = decision;
+  alignment.reason = reason.str();
+  alignment.pose = guess;
+  return alignment;
+}
+
+/// Accepted, or refused by the first figure that is beyond its limit.
+Alignment judged(Alignment alignment, const Eigen::Isometry3d& guess, const ScanAlignerParameters& p) {
+  const auto refuse = [&](AlignmentDecision decision, double figure, const char* relation, double limit) {
+    return refused(alignment, guess, decision, figure, relation, limit);
+  };
+  if (alignment.conditioning < p.min_conditioning) {
+    return refuse(AlignmentDecision::kDegenerate, alignment.conditioning, "<", p.min_conditioning);
+  }
+  if (alignment.inlier_fraction < p.min_inlier_fraction) {
+    return refuse(AlignmentDecision::kTooFewInliers, alignment.inlier_fraction, "<", p.min_inlier_fraction);
+  }
+  if (alignment.residual_m > p.max_residual) {
+    return refuse(AlignmentDecision::kLargeResidual, alignment.residual_m, ">", p.max_residual);
+  }
+  if (alignment.correction_m > p.max_correction) {
+    return refuse(AlignmentDecision::kLargeCorrection, alignment.correction_m, "m >", p.max_correction);
+  }
+  if (alignment.correction_rad > p.max_correction_angle) {
+    return refuse(AlignmentDecision::kLargeCorrection, alignment.correction_rad, "rad >", p.max_correction_angle);
+  }
+  alignment.decision = AlignmentDecision::kAccepted;
+  return alignment;
 }
 
 }  // namespace
@@ -102,6 +219,42 @@ struct ScanAligner::Target {
     plane.is_flat = solver.eigenvalues()[0] < kMaxThickness * solver.eigenvalues()[1];
     return plane;
   }
+
+  using Planes = std::vector<Plane>;  ///< of each point, fitted when it is first asked for
+
+  /// The constraints of the scan at this pose.
+  Constraints constrain(const Source& source, const Eigen::Isometry3d& pose, const Tolerance& tolerance,
+                        const ScanAlignerParameters& p, Planes& planes) const {
+    Constraints sum;
+    const Eigen::Vector3d pivot = pose * source.middle;
+    std::vector<int> nearest(1);
+    std::vector<float> squared(1);
+    for (const Eigen::Vector3f& point : source.points) {
+      const Eigen::Vector3d moved = pose * point.cast<double>();
+      const Eigen::Vector3f single = moved.cast<float>();
+      if (search.nearestKSearch(pcl::PointXYZ(single.x(), single.y(), single.z()), 1, nearest, squared) != 1 ||
+          squared[0] > tolerance.near_m * tolerance.near_m) {
+        continue;
+      }
+      const auto index = static_cast<std::size_t>(nearest[0]);
+      Plane& plane = planes[index];
+      if (!plane.is_known) plane = fit(index, p.normal_neighbours);
+      if (!plane.is_flat) continue;
+      ++sum.matched;
+      const double residual_m = plane.normal.dot(moved - plane.center);
+      if (std::abs(residual_m) <= p.inlier_distance) {
+        ++sum.inliers;
+        sum.squared_residuals += residual_m * residual_m;
+      }
+      Vector6 jacobian;
+      jacobian << (moved - pivot).cross(plane.normal) / source.lever_m, plane.normal;
+      const double ratio = residual_m / tolerance.inlier_m;
+      const double weight = 1.0 / ((1.0 + ratio * ratio) * (1.0 + ratio * ratio));  // Geman-McClure
+      sum.information += weight * jacobian * jacobian.transpose();
+      sum.gradient += weight * residual_m * jacobian;
+    }
+    return sum;
+  }
 };
 
 ScanAligner::ScanAligner(const PointCloud& map, const ScanAlignerParameters& parameters)
@@ -116,132 +269,36 @@ ScanAligner::~ScanAligner() = default;
 Alignment ScanAligner::align(const PointCloud& scan, const Eigen::Isometry3d& guess) const {
   const auto& p = parameters_;
   Alignment alignment;
-  alignment.pose = guess;
-  const auto refuse = [&](AlignmentDecision decision, double figure, const char* relation, double limit) {
-    std::ostringstream reason;
-    reason << enum_name(decision) << ": " << figure << ' ' << relation << ' ' << limit;
-    alignment.decision = decision;
-    alignment.reason = reason.str();
-    alignment.pose = guess;
-    return alignment;
-  };
-
-  PointCloud source = finite_points(scan);
-  const std::size_t fewest = std::min(source.size(), target_->points.size());
+  PointCloud points = finite_points(scan);
+  const std::size_t fewest = std::min(points.size(), target_->points.size());
   if (fewest < kMinPoints || !guess.matrix().allFinite()) {
-    return refuse(AlignmentDecision::kTooFewPoints, static_cast<double>(fewest), "of", kMinPoints);
+    return refused(alignment, guess, AlignmentDecision::kTooFewPoints, static_cast<double>(fewest), "of", kMinPoints);
   }
-  const auto wanted = static_cast<std::size_t>(p.max_points);
-  if (source.size() > wanted) {
-    PointCloud chosen;
-    for (std::size_t i = 0; i < wanted; ++i) chosen.push_back(source[i * source.size() / wanted]);
-    source = std::move(chosen);
-  }
-  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
-  for (const Eigen::Vector3f& point : source) middle += point.cast<double>();
-  middle /= static_cast<double>(source.size());
-  double lever_m = 0.0;
-  for (const Eigen::Vector3f& point : source) lever_m += (point.cast<double>() - middle).squaredNorm();
-  lever_m = std::max(1.0, std::sqrt(lever_m / static_cast<double>(source.size())));
-
-  std::vector<Target::Plane> planes(target_->points.size());
-  const auto constrain = [&](const Eigen::Isometry3d& pose, double near_m, double inlier_m) {
-    Constraints sum;
-    const Eigen::Vector3d pivot = pose * middle;
-    std::vector<int> nearest(1);
-    std::vector<float> squared(1);
-    for (const Eigen::Vector3f& point : source) {
-      const Eigen::Vector3d moved = pose * point.cast<double>();
-      const Eigen::Vector3f single = moved.cast<float>();
-      if (target_->search.nearestKSearch(pcl::PointXYZ(single.x(), single.y(), single.z()), 1, nearest, squared) != 1 ||
-          squared[0] > near_m * near_m) {
-        continue;
-      }
-      const auto index = static_cast<std::size_t>(nearest[0]);
-      Target::Plane& plane = planes[index];
-      if (!plane.is_known) plane = target_->fit(index, p.normal_neighbours);
-      if (!plane.is_flat) continue;
-      ++sum.matched;
-      const double residual_m = plane.normal.dot(moved - plane.center);
-      if (std::abs(residual_m) <= p.inlier_distance) {
-        ++sum.inliers;
-        sum.squared_residuals += residual_m * residual_m;
-      }
-      Vector6 jacobian;
-      jacobian << (moved - pivot).cross(plane.normal) / lever_m, plane.normal;
-      const double ratio = residual_m / inlier_m;
-      const double weight = 1.0 / ((1.0 + ratio * ratio) * (1.0 + ratio * ratio));  // Geman-McClure
-      sum.information += weight * jacobian * jacobian.transpose();
-      sum.gradient += weight * residual_m * jacobian;
-    }
-    return sum;
-  };
-
+  const Source source = source_of(thinned(std::move(points), static_cast<std::size_t>(p.max_points)));
   const std::vector<int> axes = free_axes(p.freedom);
-  Eigen::Isometry3d pose = guess;
+  const Schedule schedule{p};
+  Target::Planes planes(target_->points.size());
+  alignment.pose = guess;
   for (int i = 0; i < p.max_iterations; ++i) {
-    const double progress = p.max_iterations > 1 ? static_cast<double>(i) / (p.max_iterations - 1) : 1.0;
-    const double shrink = std::pow(p.final_distance / p.max_distance, progress);
-    const Constraints sum =
-        constrain(pose, p.max_distance * shrink, p.inlier_distance / p.final_distance * p.max_distance * shrink);
+    const Constraints sum = target_->constrain(source, alignment.pose, schedule.tolerance(i), p, planes);
     if (sum.matched < kMinPoints) break;
-    // A trace of damping: without it a direction that is not constrained would be moved in at random.
-    Eigen::MatrixXd information = selected(sum.information, axes);
-    information.diagonal().array() += 1e-6 * information.trace() + 1e-9;
-    Eigen::VectorXd gradient(information.rows());
-    for (std::size_t k = 0; k < axes.size(); ++k) gradient[static_cast<Eigen::Index>(k)] = sum.gradient[axes[k]];
-    const Eigen::VectorXd solution = -information.ldlt().solve(gradient);
-    Vector6 step = Vector6::Zero();
-    for (std::size_t k = 0; k < axes.size(); ++k) step[axes[k]] = solution[static_cast<Eigen::Index>(k)];
-    const Eigen::Vector3d rotation = step.head<3>() / lever_m;
-    const Eigen::Vector3d pivot = pose * middle;
-    const double angle = rotation.norm();
-    Eigen::Isometry3d change = Eigen::Isometry3d::Identity();
-    change.translate(pivot + step.tail<3>());
-    if (angle > 0.0) change.rotate(Eigen::AngleAxisd(angle, rotation / angle));
-    change.translate(-pivot);
-    pose = change * pose;
+    const Vector6 step = solve(sum, axes);
+    alignment.pose = moved_by(step, alignment.pose, source);
     alignment.iterations = i + 1;
-    if (step.norm() < kConverged_m && progress >= 0.5) break;
+    if (step.norm() < kConverged_m && schedule.progress(i) >= 0.5) break;
   }
 
-  const Constraints verdict = constrain(pose, p.final_distance, p.inlier_distance);
-  const auto points = static_cast<double>(source.size());
-  alignment.overlap = static_cast<double>(verdict.matched) / points;
+  const Constraints last = target_->constrain(source, alignment.pose, schedule.final(), p, planes);
+  alignment.overlap = static_cast<double>(last.matched) / static_cast<double>(source.points.size());
   if (alignment.overlap < p.min_overlap) {
-    return refuse(AlignmentDecision::kNoOverlap, alignment.overlap, "<", p.min_overlap);
+    return refused(alignment, guess, AlignmentDecision::kNoOverlap, alignment.overlap, "<", p.min_overlap);
   }
-  alignment.inlier_fraction = static_cast<double>(verdict.inliers) / static_cast<double>(verdict.matched);
-  if (verdict.inliers > 0) {
-    alignment.residual_m = std::sqrt(verdict.squared_residuals / static_cast<double>(verdict.inliers));
-  }
-  const Eigen::MatrixXd information = selected(verdict.information, axes);
-  const double trace = information.trace();
-  if (trace > 0.0) {
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(information, Eigen::EigenvaluesOnly);
-    alignment.conditioning = std::max(0.0, solver.eigenvalues()[0]) / trace;
-  }
-  const Eigen::Vector3d moved_m = pose * middle - guess * middle;
-  alignment.correction_m = moved_m.norm();
-  alignment.correction_rad = Eigen::AngleAxisd(pose.linear() * guess.linear().transpose()).angle();
-  if (alignment.conditioning < p.min_conditioning) {
-    return refuse(AlignmentDecision::kDegenerate, alignment.conditioning, "<", p.min_conditioning);
-  }
-  if (alignment.inlier_fraction < p.min_inlier_fraction) {
-    return refuse(AlignmentDecision::kTooFewInliers, alignment.inlier_fraction, "<", p.min_inlier_fraction);
-  }
-  if (alignment.residual_m > p.max_residual) {
-    return refuse(AlignmentDecision::kLargeResidual, alignment.residual_m, ">", p.max_residual);
-  }
-  if (alignment.correction_m > p.max_correction) {
-    return refuse(AlignmentDecision::kLargeCorrection, alignment.correction_m, "m >", p.max_correction);
-  }
-  if (alignment.correction_rad > p.max_correction_angle) {
-    return refuse(AlignmentDecision::kLargeCorrection, alignment.correction_rad, "rad >", p.max_correction_angle);
-  }
-  alignment.decision = AlignmentDecision::kAccepted;
-  alignment.pose = pose;
-  return alignment;
+  alignment.inlier_fraction = static_cast<double>(last.inliers) / static_cast<double>(last.matched);
+  if (last.inliers > 0) alignment.residual_m = std::sqrt(last.squared_residuals / static_cast<double>(last.inliers));
+  alignment.conditioning = conditioning_of(last, axes);
+  alignment.correction_m = Eigen::Vector3d(alignment.pose * source.middle - guess * source.middle).norm();
+  alignment.correction_rad = Eigen::AngleAxisd(alignment.pose.linear() * guess.linear().transpose()).angle();
+  return judged(alignment, guess, p);
 }
 
 }  // namespace urban_gnss

@@ -81,10 +81,10 @@ void VoxelMap::add_point(const Eigen::Vector3f& point, InsertReport& report) {
   }
   const VoxelCoordinates coordinates = voxel_of(point.cast<double>(), inverse_voxel_);
   const VoxelCoordinates cell_coordinates = cell_of(coordinates);
-  const std::uint64_t bit = bit_of(coordinates);
+  const std::uint64_t bit = cell_bits::bit_of(coordinates);
   const Index found = find_cell(cell_coordinates);
   if (found != kNone && (masks_[found] & bit) != 0) {
-    const Index voxel = blocks_[found].begin + rank(masks_[found], bit);
+    const Index voxel = blocks_[found].begin + cell_bits::rank(masks_[found], bit);
     // The mean follows at least every thousandth return, so that an old voxel is not deaf.
     const std::uint32_t count = std::min(++counts_[voxel].returns, 1000U);
     surface_[voxel].mean += (point - surface_[voxel].mean) / static_cast<float>(count);
@@ -103,7 +103,7 @@ void VoxelMap::add_point(const Eigen::Vector3f& point, InsertReport& report) {
     block.begin = begin;
     block.size_class = static_cast<std::uint8_t>(size_class);
   }
-  const Index voxel = block.begin + rank(masks_[cell], bit);
+  const Index voxel = block.begin + cell_bits::rank(masks_[cell], bit);
   for (Index i = block.begin + block.count; i > voxel; --i) copy_voxel(i - 1, i);
   surface_[voxel] = {point, 0.0F};
   counts_[voxel] = {1, 0, 0};
@@ -131,9 +131,9 @@ VoxelMap::Index VoxelMap::occupy(const VoxelCoordinates& center) {
   for_each_nearby([&](int x, int y, int z) {
     const VoxelCoordinates neighbour = center + VoxelCoordinates(x, y, z);
     const Index brick = find_or_add_brick(brick_of(neighbour));
-    const Index place = place_of(neighbour);
+    const Index place = cell_bits::place_of(neighbour);
     near_[brick] |= std::uint64_t{1} << place;
-    nearby_[kPlaces * brick + place] |= nearby_bit(-x, -y, -z);
+    nearby_[kPlaces * brick + place] |= cell_bits::nearby_bit(-x, -y, -z);
   });
   return find_cell(center);
 }
@@ -143,9 +143,9 @@ void VoxelMap::release(const VoxelCoordinates& center) {
     const VoxelCoordinates neighbour = center + VoxelCoordinates(x, y, z);
     const auto key = voxel_key(brick_of(neighbour));
     const Index brick = brick_index_.find(key);
-    const Index place = place_of(neighbour);
+    const Index place = cell_bits::place_of(neighbour);
     std::uint32_t& nearby = nearby_[kPlaces * brick + place];
-    nearby &= ~nearby_bit(-x, -y, -z);
+    nearby &= ~cell_bits::nearby_bit(-x, -y, -z);
     if (nearby != 0) return;
     near_[brick] &= ~(std::uint64_t{1} << place);
     if (near_[brick] != 0) return;
@@ -240,7 +240,7 @@ std::size_t VoxelMap::drop_beyond(const Eigen::Vector3d& center, double distance
       block.count = static_cast<std::uint8_t>(kept - block.begin);
       if (block.count > 0) continue;
       unused_blocks_[block.size_class].push_back(block.begin);
-      emptied.push_back(kBrickCells * voxel_of_key(key) + at_place(place));
+      emptied.push_back(kBrickCells * voxel_of_key(key) + cell_bits::at_place(place));
     }
   });
   for (const VoxelCoordinates& cell : emptied) release(cell);
@@ -266,11 +266,41 @@ VoxelMap::Index VoxelMap::find(const Eigen::Vector3d& point) const {
   return find_voxel(voxel_of(point, inverse_voxel_));
 }
 
+std::size_t VoxelMap::find_nearby(Index index, const VoxelCoordinates& cell, const VoxelCoordinates& low,
+                                  const VoxelCoordinates& high, std::array<CellVoxels, 27>& found) const {
+  const std::uint32_t nearby = nearby_[index];
+  const Index brick = index / kPlaces;
+  const VoxelCoordinates brick_coordinates = brick_of(cell);
+  const VoxelCoordinates first = (cell_of(low)).cwiseMax((cell.array() - 1).matrix());
+  const VoxelCoordinates last = (cell_of(high)).cwiseMin((cell.array() + 1).matrix());
+  std::size_t count = 0;
+  VoxelCoordinates at;
+  for (at.x() = first.x(); at.x() <= last.x(); ++at.x()) {
+    const std::uint64_t in_x = cell_bits::slab(0, at, low, high);
+    for (at.y() = first.y(); at.y() <= last.y(); ++at.y()) {
+      const std::uint64_t in_xy = in_x & cell_bits::slab(1, at, low, high);
+      for (at.z() = first.z(); at.z() <= last.z(); ++at.z()) {
+        if ((nearby & cell_bits::nearby_bit(at.x() - cell.x(), at.y() - cell.y(), at.z() - cell.z())) == 0) continue;
+        const VoxelCoordinates other = brick_of(at);
+        const Index index_of_other =
+            kPlaces * (other == brick_coordinates ? brick : find_brick(other)) + cell_bits::place_of(at);
+        const std::uint64_t mask = masks_[index_of_other];
+        const std::uint64_t wanted = mask & in_xy & cell_bits::slab(2, at, low, high);
+        if (wanted == 0) continue;
+        const Index begin = blocks_[index_of_other].begin;
+        __builtin_prefetch(&surface_[begin + cell_bits::rank(mask, wanted & (~wanted + 1))]);
+        found[count++] = {begin, mask, wanted};
+      }
+    }
+  }
+  return count;
+}
+
 VoxelMap::Index VoxelMap::find_voxel(const VoxelCoordinates& voxel) const {
   const Index cell = find_cell(cell_of(voxel));
-  const std::uint64_t bit = bit_of(voxel);
+  const std::uint64_t bit = cell_bits::bit_of(voxel);
   if (cell == kNone || (masks_[cell] & bit) == 0) return kNone;
-  return blocks_[cell].begin + rank(masks_[cell], bit);
+  return blocks_[cell].begin + cell_bits::rank(masks_[cell], bit);
 }
 
 PointCloud VoxelMap::points_within(const Eigen::Vector3d& center, double radius_m) const {

@@ -145,6 +145,15 @@ Stretch clip(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, co
   return stretch;
 }
 
+/// The part of a ray within the tracer's range that may meet something of the map.
+Stretch stretch_through(const VoxelMap& map, const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
+                        const VoxelRayTracerParameters& parameters) {
+  Eigen::AlignedBox3d bounds = map.bounds();
+  bounds.extend((bounds.min().array() - kMargin_m).matrix());  // a flat map has a thickness
+  bounds.extend((bounds.max().array() + kMargin_m).matrix());
+  return clip(origin, direction, bounds, {parameters.min_range, parameters.max_range});
+}
+
 }  // namespace
 
 void VoxelRayTracerParameters::check(std::vector<std::string>& faults) const {
@@ -166,10 +175,7 @@ VoxelRayTracer::VoxelRayTracer(const VoxelMap& map, const VoxelRayTracerParamete
 RayVerdict VoxelRayTracer::trace(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const {
   RayVerdict verdict;
   if (map_->size() == 0 || !origin.allFinite() || !direction.allFinite()) return verdict;
-  Eigen::AlignedBox3d bounds = map_->bounds();
-  bounds.extend((bounds.min().array() - kMargin_m).matrix());  // a flat map has a thickness
-  bounds.extend((bounds.max().array() + kMargin_m).matrix());
-  const Stretch inside = clip(origin, direction, bounds, {parameters_.min_range, parameters_.max_range});
+  const Stretch inside = stretch_through(*map_, origin, direction, parameters_);
   if (inside.begin_m > inside.end_m) return verdict;
 
   const RayFrame frame(origin, direction);

@@ -148,6 +148,20 @@ void ParameterList::on_end(const std::vector<std::string>&) {
   struct_is_group_.pop_back();
 }
 
+bool ParameterList::has(const ListedParameter& parameter) const {
+  return std::any_of(parameters_.begin(), parameters_.end(), [&](const ListedParameter& each) {
+    return each.path(Layout::kTiered) == parameter.path(Layout::kTiered);
+  });
+}
+
+ParameterList ParameterList::kept(const std::function<bool(const ListedParameter&)>& is_kept) const {
+  ParameterList list = *this;
+  auto& all = list.parameters_;
+  all.erase(std::remove_if(all.begin(), all.end(), [&](const ListedParameter& each) { return !is_kept(each); }),
+            all.end());
+  return list;
+}
+
 YAML::Node ParameterList::values(Layout layout) const {
   YAML::Node root(YAML::NodeType::Map);
   for (const ListedParameter& each : parameters_) {

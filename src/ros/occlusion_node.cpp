@@ -29,10 +29,12 @@ void publish_shared(const ros::Publisher& publisher, Message message) {
 
 OcclusionNode::OcclusionNode(ros::NodeHandle& node, ros::NodeHandle& private_node)
     : tf_listener_(tf_buffer_, node), fix_stamps_(1.0), diagnostics_(node, private_node, private_node.getNamespace()) {
-  OcclusionPipelineParameters pipeline;
-  read_private_parameters(private_node, pipeline, frames_, parameters_);
+  OcclusionNodeSettings settings;
+  read_private_parameters(private_node, settings);
+  frames_ = settings.frames;
+  parameters_ = settings.node;
   if (!parameters_.prior_map.empty()) prior_ = read_pcd(parameters_.prior_map);
-  pipeline_ = std::make_unique<OcclusionPipeline>(pipeline);
+  pipeline_ = std::make_unique<OcclusionPipeline>(settings.pipeline);
   fix_stamps_ = StampMonitor(parameters_.time_jump);
   antenna_known_ = pipeline.occlusion.antenna_offset != std::vector<double>{0.0, 0.0, 0.0};
 
@@ -64,7 +66,7 @@ OcclusionNode::OcclusionNode(ros::NodeHandle& node, ros::NodeHandle& private_nod
 
 OcclusionNode::~OcclusionNode() { fix_subscriber_.shutdown(); }  // fix_watch_ holds it too
 
-/// Nothing where tf does not know it (yet). Never waits (F24).
+/// Nothing where tf does not know it (yet). Never waits.
 std::optional<geometry_msgs::TransformStamped> OcclusionNode::look_up(const std::string& to, const std::string& from,
                                                                       const ros::Time& time) {
   try {

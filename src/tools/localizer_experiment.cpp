@@ -2,7 +2,6 @@
 
 #include "urban_gnss_localization/experiments/localizer_experiment.hpp"
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -12,18 +11,16 @@
 #include <iostream>
 #include <nlohmann/json.hpp>
 #include <sstream>
-#include <thread>
 
+#include "command_line.hpp"
 #include "find_scenario.hpp"
 #include "output_file.hpp"
+#include "overrides.hpp"
 #include "parallel_jobs.hpp"
 #include "urban_gnss_localization/evaluation/report_json.hpp"
-#include "urban_gnss_localization/localizers/kim/complementary_ekf.hpp"
-#include "urban_gnss_localization/localizers/switching/imm_ekf.hpp"
-#include "urban_gnss_localization/localizers/switching/switching_particle_filter.hpp"
-#include "urban_gnss_localization/localizers/maier/ukf.hpp"
 #include "urban_gnss_localization/geometry/angles.hpp"
-#include "urban_gnss_localization/parameters/parameter_reader.hpp"
+#include "urban_gnss_localization/localizers/registry.hpp"
+#include "urban_gnss_localization/pipeline/bias_pipeline.hpp"
 
 namespace fs = std::filesystem;
 using namespace urban_gnss;
@@ -34,97 +31,71 @@ const std::string kWithOcclusion = "+occlusion";
 
 struct Options {
   std::vector<std::string> scenarios{"downtown_grid", "campus_loop", "building_pass", "open_sky", "tunnel"};
-  std::vector<std::string> localizers{
-      "paper",         "ekf",     "gated_ekf",         "complementary_ekf", "ukf",
-      "ukf+occlusion", "imm_ekf", "imm_ekf+occlusion", "switching",         "switching+occlusion"};
+  std::vector<std::string> localizers;
   int seeds = 10;
   int first_seed = 1;
   double duration_s = 0.0;
   std::vector<std::string> overrides;
   std::vector<std::string> scenario_overrides;
   std::string json_file;
-  int jobs = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+  int jobs = 1;
 };
 
-/// Everything with a name in --set.
-struct Settings {
-  LocalizerExperimentConditions conditions;
-  ParticleFilterParameters particle_filter;
-  MotionParameters particle_filter_motion;
-  ComplementaryEkfParameters complementary_ekf;
-  UkfParameters ukf;
-  MotionParameters ukf_motion;
-  ImmEkfParameters imm_ekf;
-  MotionParameters imm_ekf_motion;
-};
+/// All variants of the registry, and after each that gains from it the same behind the occlusion node.
+std::vector<std::string> default_localizers(const LocalizerRegistry& registry) {
+  std::vector<std::string> names;
+  for (const LocalizerVariant& variant : registry.variants()) {
+    names.push_back(variant.name);
+    if (variant.with_occlusion) names.push_back(variant.name + kWithOcclusion);
+  }
+  return names;
+}
 
-Settings read_settings(const std::vector<std::string>& overrides) {
-  std::map<std::string, YAML::Node> sections;
+/// What --set says, by section: localization, occlusion, gps_bias or a localizer's name.
+YAML::Node read_sections(const std::vector<std::string>& overrides, const LocalizerRegistry& registry) {
+  std::vector<std::string> known{"localization", "occlusion", "gps_bias"};
+  for (const LocalizerEntry& entry : registry.entries()) known.push_back(entry.name);
+  YAML::Node sections(YAML::NodeType::Map);
   for (const std::string& text : overrides) {
-    const auto dot = text.find('.');
-    const auto equal = text.find('=');
-    if (equal == std::string::npos || dot == std::string::npos || dot > equal) {
-      throw std::runtime_error("--set " + text + ": must be SECTION.NAME=VALUE, e.g. ukf.student_dof=3");
+    const std::string section = text.substr(0, text.find_first_of(".="));
+    if (std::find(known.begin(), known.end(), section) == known.end()) {
+      throw std::runtime_error("--set " + text + ": must be SECTION.NAME=VALUE, e.g. ukf.outliers=gate");
     }
-    sections[text.substr(0, dot)][text.substr(dot + 1, equal - dot - 1)] = YAML::Load(text.substr(equal + 1));
+    assign(sections, text);
   }
-  Settings settings;
-  std::vector<std::string> faults;
-  const auto read = [&](const std::string& section, auto&... parameters) {
-    const auto found = sections.find(section);
-    if (found == sections.end()) return;
-    ParameterReader reader(found->second);
-    (reader.read(parameters), ...);
-    for (const std::string& fault : reader.finish()) faults.push_back(section + "." + fault);
-    sections.erase(found);
-  };
-  read("localization", settings.conditions.localization);
-  read("occlusion", settings.conditions.occlusion);
-  read("gps_bias", settings.conditions.bias);
-  read("particle_filter", settings.particle_filter, settings.particle_filter_motion);
-  read("complementary_ekf", settings.complementary_ekf);
-  read("ukf", settings.ukf, settings.ukf_motion);
-  read("imm_ekf", settings.imm_ekf, settings.imm_ekf_motion);
-  for (const auto& [section, values] : sections) faults.push_back(section + ": no such section");
-  if (!faults.empty()) throw ParameterError("--set", faults);
-  return settings;
+  for (const std::string& name : known) {
+    if (!sections[name].IsDefined()) sections[name] = YAML::Node(YAML::NodeType::Map);
+  }
+  return sections;
 }
 
-std::function<std::unique_ptr<Localizer>()> localizer_of(const std::string& name, const Settings& settings) {
-  const auto complementary = [&settings](ComplementaryMode mode) {
-    ComplementaryEkfParameters parameters = settings.complementary_ekf;
-    parameters.mode = mode;
-    return [parameters] { return std::make_unique<ComplementaryEkf>(parameters); };
-  };
-  if (name == "paper" || name == "switching") {
-    ParticleFilterParameters parameters = settings.particle_filter;
-    parameters.mode = name == "paper" ? ParticleFilterMode::kPaper : ParticleFilterMode::kSwitching;
-    return [parameters, &settings] { return make_particle_filter(parameters, settings.particle_filter_motion); };
-  }
-  if (name == "imm_ekf") {
-    return [&settings] { return std::make_unique<ImmEkf>(settings.imm_ekf, settings.imm_ekf_motion); };
-  }
-  if (name == "ekf") return complementary(ComplementaryMode::kStandard);
-  if (name == "gated_ekf") return complementary(ComplementaryMode::kGated);
-  if (name == "complementary_ekf") return complementary(ComplementaryMode::kCompensated);
-  if (name == "ukf") return [&settings] { return std::make_unique<Ukf>(settings.ukf, settings.ukf_motion); };
-  throw std::runtime_error(
-      "--localizers " + name +
-      ": no such localizer; there are paper, switching, ekf, gated_ekf, complementary_ekf, ukf, imm_ekf, each also "
-      "with " +
-      kWithOcclusion);
+LocalizerExperimentConditions read_conditions(const YAML::Node& sections) {
+  LocalizerExperimentConditions conditions;
+  read_overrides("--set localization", sections["localization"], {}, conditions.localization);
+  read_overrides("--set occlusion", sections["occlusion"], {}, conditions.occlusion);
+  BiasPipelineParameters gps_bias;
+  read_overrides("--set gps_bias", sections["gps_bias"], {}, gps_bias);
+  conditions.bias = gps_bias.bias;
+  return conditions;
 }
 
-std::vector<Contender> select_contenders(const std::vector<std::string>& names, const Settings& settings) {
+Contender make_contender(const std::string& name, const LocalizerRegistry& registry, const YAML::Node& sections) {
+  Contender contender;
+  contender.name = name;
+  const auto plus = name.rfind(kWithOcclusion);
+  contender.uses_occlusion = plus != std::string::npos && plus + kWithOcclusion.size() == name.size();
+  const LocalizerChoice choice = registry.choose(contender.uses_occlusion ? name.substr(0, plus) : name);
+  const std::shared_ptr<LocalizerSettings> settings = choice.entry->settings();
+  read_overrides("--set " + choice.entry->name, YAML::Clone(sections[choice.entry->name]), choice.assignments,
+                 *settings);
+  contender.make = [settings] { return settings->make(); };
+  return contender;
+}
+
+std::vector<Contender> select_contenders(const Options& options, const YAML::Node& sections) {
+  const LocalizerRegistry registry = standard_localizers();
   std::vector<Contender> contenders;
-  for (const std::string& name : names) {
-    Contender contender;
-    contender.name = name;
-    const auto plus = name.rfind(kWithOcclusion);
-    contender.uses_occlusion = plus != std::string::npos && plus + kWithOcclusion.size() == name.size();
-    contender.make = localizer_of(contender.uses_occlusion ? name.substr(0, plus) : name, settings);
-    contenders.push_back(contender);
-  }
+  for (const std::string& name : options.localizers) contenders.push_back(make_contender(name, registry, sections));
   return contenders;
 }
 
@@ -165,8 +136,9 @@ void print_row(const std::string& name, const ContenderSummary& s) {
 }
 
 void run_all(const Options& options, const std::string& command) {
-  const Settings settings = read_settings(options.overrides);
-  const std::vector<Contender> contenders = select_contenders(options.localizers, settings);
+  const YAML::Node sections = read_sections(options.overrides, standard_localizers());
+  const LocalizerExperimentConditions conditions = read_conditions(sections);
+  const std::vector<Contender> contenders = select_contenders(options, sections);
   const auto seeds = static_cast<std::size_t>(options.seeds);
   std::vector<std::vector<LocalizerRun>> runs(options.scenarios.size(), std::vector<LocalizerRun>(seeds));
   const auto start = std::chrono::steady_clock::now();
@@ -179,7 +151,7 @@ void run_all(const Options& options, const std::string& command) {
              overrides.push_back("seed=" + std::to_string(options.first_seed + static_cast<int>(s)));
              if (options.duration_s > 0.0) overrides.push_back("duration=" + std::to_string(options.duration_s));
              const Scenario scenario = load_scenario(find_scenario(options.scenarios[i]).string(), overrides);
-             runs[i][s] = run_localizer_experiment(scenario, contenders, settings.conditions, on_progress);
+             runs[i][s] = run_localizer_experiment(scenario, contenders, conditions, on_progress);
            });
 
   nlohmann::json metrics;
@@ -210,31 +182,17 @@ void run_all(const Options& options, const std::string& command) {
 
 int main(int argc, char** argv) {
   Options options;
-  CLI::App app("Localizers on simulated scenarios, with their errors against the truth.");
-  app.option_defaults()->always_capture_default();
-  app.add_option("--scenarios", options.scenarios, "files, or names of the package's; comma-separated")->delimiter(',');
-  app.add_option("--localizers", options.localizers,
-                 "comma-separated; NAME" + kWithOcclusion + ": with the covariances of the occlusion node")
+  options.localizers = default_localizers(standard_localizers());
+  CommandLine line("localizer_experiment", "Localizers on simulated scenarios, with their errors against the truth.");
+  line.add_scenarios(options.scenarios, options.scenario_overrides);
+  line.app()
+      .add_option("--localizers", options.localizers,
+                  "comma-separated; NAME" + kWithOcclusion + ": with the covariances of the occlusion node")
       ->delimiter(',');
-  app.add_option("--seeds", options.seeds, "how many seeds")->check(CLI::PositiveNumber);
-  app.add_option("--first-seed", options.first_seed, "the first of them")->check(CLI::NonNegativeNumber);
-  app.add_option("--duration", options.duration_s, "s to simulate at most; default: the scenario's")
-      ->check(CLI::PositiveNumber);
-  app.add_option("--set", options.overrides,
-                 "another parameter, SECTION.NAME=VALUE with the section localization, occlusion, gps_bias or a "
-                 "localizer's; repeatable");
-  app.add_option("--scenario-set", options.scenario_overrides,
-                 "a value of the scenario, SECTION.NAME=VALUE; repeatable");
-  app.add_option("--json", options.json_file, "write the metrics here");
-  app.add_option("--jobs", options.jobs, "threads")->check(CLI::PositiveNumber);
-  CLI11_PARSE(app, argc, argv);
-  std::string command = "rosrun urban_gnss_localization localizer_experiment";
-  for (int i = 1; i < argc; ++i) command += std::string(" ") + argv[i];
-  try {
-    run_all(options, command);
-  } catch (const std::exception& error) {
-    std::cerr << "localizer_experiment: " << error.what() << '\n';
-    return 1;
-  }
-  return 0;
+  line.add_seeds(options.seeds, options.first_seed);
+  line.add_duration(options.duration_s);
+  line.add_set("--set", options.overrides, "after localization., occlusion., gps_bias. or LOCALIZER., a parameter");
+  line.add_json(options.json_file);
+  line.add_jobs(options.jobs);
+  return line.run(argc, argv, [&] { run_all(options, line.command()); });
 }

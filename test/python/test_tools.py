@@ -122,7 +122,7 @@ class ToolTest(unittest.TestCase):
         for name in ("a", "b"):
             self.succeed("replay", self.path("in.bag"), *RANDOM, "--output", self.path(name + ".bag"), "--tum",
                          self.path(name + ".tum"), "--json", self.path(name + ".json"), "--seed", 5)
-        for kind in (".bag", ".tum", ".json"):  # F26
+        for kind in (".bag", ".tum", ".json"):
             self.assertTrue(filecmp.cmp(self.path("a" + kind), self.path("b" + kind), shallow=False), kind)
         self.succeed("replay", self.path("in.bag"), *RANDOM, "--tum", self.path("c.tum"), "--seed", 6)
         self.assertFalse(filecmp.cmp(self.path("a.tum"), self.path("c.tum"), shallow=False))
@@ -145,7 +145,7 @@ class ToolTest(unittest.TestCase):
         self.assertAlmostEqual(float(first[2]) - float(other[2]), 111.2, delta=5.0)
 
     def test_every_fix_gets_its_decision(self):
-        """F2: also where two fixes are decided upon at once, between two messages of slow odometry."""
+        """Also where two fixes are decided upon at once, between two messages of slow odometry."""
         write_recording(self.directory)
         with open(self.path("odom.csv")) as file:
             lines = file.readlines()

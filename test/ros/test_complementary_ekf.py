@@ -77,7 +77,7 @@ class ComplementaryEkfTest(unittest.TestCase):
         self.assertEqual(self.client.update_configuration({"mode": "bold"})["mode"], "standard")
 
     def test_clock_that_jumps_back_resets_everything(self):
-        """F21, F26."""
+        """The clock jumps back, the graph starts anew and does the same again."""
         first, _ = self.run_in("compensated")
         second = self.graph.feed(self.drive.messages)
         worst = max(math.hypot(a[1] - b[1], a[2] - b[2]) for a, b in zip(drive.poses(first), drive.poses(second)))

@@ -52,7 +52,7 @@ class DemoTest(unittest.TestCase):
         self.assertLess(max(errors), BOUND_M)
         self.assertLess(math.sqrt(sum(e * e for e in errors) / len(errors)), RMSE_BOUND_M)
         self.assertTrue(any(shadow) and not all(shadow), "the lap must cross the border of the shadow")
-        self.assertTrue(all(a < b for a, b in zip(order, order[1:])), "stamps must ascend (F22)")
+        self.assertTrue(all(a < b for a, b in zip(order, order[1:])), "stamps must ascend")
         self.assertTrue(status[-1].healthy, status[-1].reason)
         self.assertGreater(status[-1].fixes_used, 500)
         self.assertEqual(clouds[-1].width * clouds[-1].height, 1000)

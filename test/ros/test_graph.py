@@ -34,7 +34,7 @@ class GraphTest(unittest.TestCase):
         rospy.ServiceProxy("particle_filter/reset", Empty)()
 
     def test_bag_that_starts_over_resets_everything(self):
-        """F21, F22, F26: the clock jumps back, the graph starts anew and does the same again."""
+        """The clock jumps back, the graph starts anew and does the same again."""
         first = self.graph.feed(self.drive.messages)
         second = self.graph.feed(self.drive.messages)
         self.assertEqual(len(first), len(second))
@@ -45,7 +45,7 @@ class GraphTest(unittest.TestCase):
         self.assertLess(drive.rmse(second, self.drive.truth), NOT_LOST_M)
 
     def test_bad_fixes_do_no_harm(self):
-        """F12, F25: NaN, no fix, zero covariance and absurd values between the good fixes."""
+        """NaN, no fix, zero covariance and absurd values between the good fixes."""
         clean = self.graph.feed(self.drive.messages)
         spoilt = []
         for index, (topic, message) in enumerate(self.drive.messages):
@@ -75,7 +75,7 @@ class GraphTest(unittest.TestCase):
         self.assertLess(worst, 1e-6)
 
     def test_zero_covariance_means_the_default(self):
-        """F12: a fix without a covariance is used, and does not make the estimate worse than its default allows."""
+        """A fix without a covariance is used, and does not make the estimate worse than its default allows."""
         bare = copy.deepcopy(self.drive.messages)
         for topic, message in bare:
             if topic == "gps/fix":
@@ -88,7 +88,7 @@ class GraphTest(unittest.TestCase):
         self.assertLess(drive.rmse(outputs, self.drive.truth), NOT_LOST_M)
 
     def test_bad_odometry_does_no_harm(self):
-        """F25: odometry that is not finite is left out."""
+        """Odometry that is not finite is left out."""
         spoilt = []
         for topic, message in self.drive.messages[:400]:
             if topic == "odom" and message.header.stamp.nsecs == 500000000:

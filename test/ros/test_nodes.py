@@ -86,7 +86,7 @@ class NodesTest(unittest.TestCase):
         return {name for _, names in publishers + subscribers for name in names}
 
     def test_says_what_it_waits_for(self):
-        """F20: within some seconds, without any input."""
+        """Within some seconds, without any input."""
         process = subprocess.Popen(command("particle_filter_node"), start_new_session=True, stdout=subprocess.PIPE,
                                    stderr=subprocess.STDOUT, universal_newlines=True)
         self.addCleanup(os.killpg, process.pid, signal.SIGKILL)

@@ -115,31 +115,8 @@ struct GnssCovariance {
 ///
 /// One clock is estimated for each constellation; SBAS and QZSS share that of GPS, whose time they keep.
 ///
-/// The soft model. The receiver's fix is x = K z with K = (H^T W H)^-1 H^T W and *its* weights W, equal or by C/N0 (the
-/// variance of a range is proportional to 10^(-C/N0 / 10); Hartinger and Brunner 1999). It does not know which signals
-/// are reflected. A range that is reflected with probability p_i has an error with
-///   mean m_i = p_i mu_i,   variance v_i = (1 - p_i) sigma_URE^2 + p_i sigma_i^2 + p_i (1 - p_i) mu_i^2,
-/// independent of the others, given the p_i. The second moment of the fix's error is thus
-///   C = K (diag(v) + m m^T) K^T.
-/// mu_i = s_i nlos_mean and sigma_i = max(s_i nlos_sigma, sigma_URE). A signal that comes over the roofs goes on
-/// between the walls for a way that is proportional to cot e, and the more of the sky is hidden, the more walls turn it
-/// on:
-///   s_i = h^nlos_hidden_exponent (cot e_i / cot 37 deg)^nlos_elevation_exponent,
-/// h the expected share without line of sight of the satellites in view (those of the list above the horizon; one that
-/// is not received has none), e_i not below 15 degrees, whence the way is limited by the walls' length. With exponents
-/// of 0, all reflections are alike.
-/// A delay that all ranges of a constellation share goes into its clock, not into C. With p = 0 and equal weights, C is
-/// eq. (4). It is a continuous function of every blocked fraction and C/N0.
-///
-/// p_i: from C/N0 c and elevation e, the log-odds are L = (nlos_cn0 + nlos_cn0_rise (sin e - 0.6) - c) /
-/// nlos_cn0_width, where nothing else is known. The rise is positive where the antenna receives best from above, and
-/// negative where that counts for less than that what stands low is hidden more often. The map alone says q =
-/// nlos_if_blocked, nlos_if_free and nlos_if_unknown, each times the share of its rays. Both together, as independent
-/// evidence: L + logit(q) - logit(nlos_if_unknown).
-///
-/// Without a usable satellite, the claim (or that of assumed_hdop) stands for the conventional model, and in the others
-/// is multiplied by 1 + (v(q) - v(nlos_if_free)) / sigma_URE^2 for the sky's q: what a sky evenly full of satellites
-/// gives, and 1 under a free one.
+/// The soft model takes each signal as NLOS with a probability, by map and C/N0, and carries mean and variance of its
+/// range error (nlos_range()) through the receiver's least squares: docs/methods/maier.md derives it.
 GnssCovariance gnss_covariance(const std::vector<SatelliteObservation>& satellites,
                                const std::optional<SkyObservation>& sky, const std::optional<Eigen::Matrix2d>& claimed,
                                const GnssCovarianceParameters& parameters);
@@ -148,8 +125,8 @@ GnssCovariance gnss_covariance(const std::vector<SatelliteObservation>& satellit
 /// Requires both positive definite and finite.
 Eigen::Matrix2d covariance_upper_bound(const Eigen::Matrix2d& matrix, const Eigen::Matrix2d& floor);
 
-/// gnss_covariance() fix by fix, with the memory of a receiver: Algorithm 3 in the paper's model, ReceiverSmoothing in
-/// the soft one. There, a fix whose satellites do not determine the position has R_inf alone and leaves no memory: the
+/// gnss_covariance() fix by fix, as a receiver smooths them: Algorithm 3 in the paper's model, ReceiverSmoothing in
+/// the soft one. There, a fix whose satellites do not determine the position has R_inf alone and is not smoothed: the
 /// receiver cannot have had a solution either.
 class GnssCovarianceModel {
  public:

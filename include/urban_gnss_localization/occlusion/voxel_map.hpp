@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "urban_gnss_localization/common/parameters.hpp"
+#include "urban_gnss_localization/occlusion/cell_bits.hpp"
 #include "urban_gnss_localization/occlusion/key_index.hpp"
 #include "urban_gnss_localization/occlusion/observed_space.hpp"
 #include "urban_gnss_localization/occlusion/point_cloud.hpp"
@@ -57,8 +58,8 @@ class VoxelMap {
  public:
   using Index = KeyIndex::Index;
   static constexpr Index kNone = KeyIndex::kNone;
-  static constexpr int kCellVoxels = 4;
-  static constexpr int kBrickCells = 4;
+  static constexpr int kCellVoxels = cell_bits::kSide;
+  static constexpr int kBrickCells = cell_bits::kSide;
 
   /// Throws ParameterError.
   explicit VoxelMap(const VoxelMapParameters& parameters);
@@ -98,7 +99,7 @@ class VoxelMap {
   /// The cell of these coordinates in the brick that holds it, kNone where neither it nor one of its 26 neighbours
   /// holds a voxel.
   Index find_cell(Index brick, const VoxelCoordinates& cell) const {
-    const Index place = place_of(cell);
+    const Index place = cell_bits::place_of(cell);
     return (near_[brick] >> place & 1U) != 0 ? kPlaces * brick + place : kNone;
   }
   Index find_cell(const VoxelCoordinates& cell) const {
@@ -114,45 +115,17 @@ class VoxelMap {
   template <class Visit>
   void for_each_nearby_voxel(Index index, const VoxelCoordinates& cell, const VoxelCoordinates& low,
                              const VoxelCoordinates& high, Visit&& visit) const {
-    const std::uint32_t nearby = nearby_[index];
-    const Index brick = index / kPlaces;
-    const VoxelCoordinates brick_coordinates = brick_of(cell);
-    const VoxelCoordinates first = (cell_of(low)).cwiseMax((cell.array() - 1).matrix());
-    const VoxelCoordinates last = (cell_of(high)).cwiseMin((cell.array() + 1).matrix());
-    struct Found {
-      Index begin;
-      std::uint64_t mask;
-      std::uint64_t inside;
-    };
-    std::array<Found, 27> found;  // so that the memory is asked for all of it before any is waited for
-    std::size_t count = 0;
-    VoxelCoordinates at;
-    for (at.x() = first.x(); at.x() <= last.x(); ++at.x()) {
-      const std::uint64_t in_x = slab(0, at, low, high);
-      for (at.y() = first.y(); at.y() <= last.y(); ++at.y()) {
-        const std::uint64_t in_xy = in_x & slab(1, at, low, high);
-        for (at.z() = first.z(); at.z() <= last.z(); ++at.z()) {
-          if ((nearby & nearby_bit(at.x() - cell.x(), at.y() - cell.y(), at.z() - cell.z())) == 0) continue;
-          const VoxelCoordinates other = brick_of(at);
-          const Index index_of_other =
-              kPlaces * (other == brick_coordinates ? brick : find_brick(other)) + place_of(at);
-          const std::uint64_t mask = masks_[index_of_other];
-          const std::uint64_t inside = mask & in_xy & slab(2, at, low, high);
-          if (inside == 0) continue;
-          const Index begin = blocks_[index_of_other].begin;
-          __builtin_prefetch(&surface_[begin + rank(mask, inside & (~inside + 1))]);
-          found[count++] = {begin, mask, inside};
-        }
-      }
-    }
+    std::array<CellVoxels, 27> found;
+    const std::size_t count = find_nearby(index, cell, low, high, found);
     for (std::size_t i = 0; i < count; ++i) {
-      for (std::uint64_t rest = found[i].inside; rest != 0; rest &= rest - 1) {
-        visit(found[i].begin + rank(found[i].mask, rest & (~rest + 1)));
+      for (std::uint64_t rest = found[i].wanted; rest != 0; rest &= rest - 1) {
+        visit(found[i].begin + cell_bits::rank(found[i].mask, rest & (~rest + 1)));
       }
     }
   }
 
  private:
+  static constexpr Index kPlaces = cell_bits::kPlaces;  ///< of cells in a brick
   static constexpr std::uint32_t kMinEvidence = 5;
   static constexpr std::size_t kSizeClasses = 5;  ///< room for 4, 8, 16, 32 or all 64 voxels of a cell
 
@@ -161,6 +134,13 @@ class VoxelMap {
     Index begin{0};
     std::uint8_t count{0};
     std::uint8_t size_class{0};  ///< only where count > 0
+  };
+
+  /// Voxels of a cell, and those of them that are wanted.
+  struct CellVoxels {
+    Index begin;
+    std::uint64_t mask;
+    std::uint64_t wanted;
   };
 
   struct Surface {
@@ -173,54 +153,16 @@ class VoxelMap {
     std::uint32_t hits{0};    ///< of followed rays that ended at the mean
   };
 
-  static std::uint32_t nearby_bit(int dx, int dy, int dz) {
-    return 1U << static_cast<unsigned>(9 * (dx + 1) + 3 * (dy + 1) + dz + 1);
-  }
-  static constexpr Index kPlaces = 64;  ///< of cells in a brick
-  /// The place of a cell in its brick, and of a voxel in its cell: octant by octant, so that neighbours are close.
-  static Index place_of(const VoxelCoordinates& at) {
-    const int place = (at.x() & 1) | (at.y() & 1) << 1 | (at.z() & 1) << 2 |  //
-                      (at.x() & 2) << 2 | (at.y() & 2) << 3 | (at.z() & 2) << 4;
-    return static_cast<Index>(place);
-  }
-  static std::uint64_t bit_of(const VoxelCoordinates& voxel) { return std::uint64_t{1} << place_of(voxel); }
-  /// The coordinates in the brick, or in the cell, of this place.
-  static VoxelCoordinates at_place(Index place) {
-    const auto bits = [place](unsigned axis) {
-      return static_cast<int>((place >> axis & 1U) | (place >> axis >> 2U & 2U));
-    };
-    return {bits(0), bits(1), bits(2)};
-  }
-  /// How many of a cell's voxels come before this one: the number of bits below it, in the registers of any machine.
-  static Index rank(std::uint64_t mask, std::uint64_t bit) {
-    std::uint64_t below = mask & (bit - 1);
-    below -= below >> 1U & 0x5555555555555555U;
-    below = (below & 0x3333333333333333U) + (below >> 2U & 0x3333333333333333U);
-    below = (below + (below >> 4U)) & 0x0F0F0F0F0F0F0F0FU;
-    return static_cast<Index>(below * 0x0101010101010101U >> 56U);
-  }
-  /// For each axis the bits of a cell's voxels from the first, second, third or fourth on, or of none.
-  static constexpr std::array<std::array<std::uint64_t, kCellVoxels + 1>, 3> kFrom{{
-      {~0ULL, 0xFFAAFFAAFFAAFFAAU, 0xFF00FF00FF00FF00U, 0xAA00AA00AA00AA00U, 0U},
-      {~0ULL, 0xFFFFCCCCFFFFCCCCU, 0xFFFF0000FFFF0000U, 0xCCCC0000CCCC0000U, 0U},
-      {~0ULL, 0xFFFFFFFFF0F0F0F0U, 0xFFFFFFFF00000000U, 0xF0F0F0F000000000U, 0U},
-  }};
-  /// The bits of this cell's voxels that are from `low` to `high` along one axis.
-  static std::uint64_t slab(std::size_t axis, const VoxelCoordinates& cell, const VoxelCoordinates& low,
-                            const VoxelCoordinates& high) {
-    const auto place = static_cast<Eigen::Index>(axis);
-    const int corner = kCellVoxels * cell[place];
-    const auto from = [&](int voxel) {
-      return kFrom[axis][static_cast<std::size_t>(std::min(std::max(voxel - corner, 0), kCellVoxels))];
-    };
-    return from(low[place]) & ~from(high[place] + 1);
-  }
   static Index room(std::size_t size_class) { return Index{4} << size_class; }
 
   void add_point(const Eigen::Vector3f& point, InsertReport& report);
   void follow_ray(const Eigen::Vector3d& sensor, const Eigen::Vector3d& end);
   void count_meeting(Index voxel, std::uint32_t Counts::*kind);
   Index find_voxel(const VoxelCoordinates& voxel) const;
+  /// The cells of for_each_nearby_voxel() that hold something wanted: so many of `found`. The memory is asked for all
+  /// of it before any is waited for.
+  std::size_t find_nearby(Index index, const VoxelCoordinates& cell, const VoxelCoordinates& low,
+                          const VoxelCoordinates& high, std::array<CellVoxels, 27>& found) const;
   Index find_or_add_brick(const VoxelCoordinates& brick);
   Index occupy(const VoxelCoordinates& cell);
   void release(const VoxelCoordinates& cell);

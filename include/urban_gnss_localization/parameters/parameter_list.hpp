@@ -2,6 +2,7 @@
 
 #include <yaml-cpp/yaml.h>
 
+#include <functional>
 #include <iosfwd>
 #include <string>
 #include <utility>
@@ -41,6 +42,10 @@ class ParameterList : public ParameterVisitor {
   }
 
   const std::vector<ListedParameter>& parameters() const { return parameters_; }
+  /// Whether it has this parameter, at the same place.
+  bool has(const ListedParameter& parameter) const;
+  /// Those for which `is_kept` is true.
+  ParameterList kept(const std::function<bool(const ListedParameter&)>& is_kept) const;
   const std::vector<ListedGroup>& groups() const { return groups_; }
 
   /// The values as a map, as ParameterReader reads it.

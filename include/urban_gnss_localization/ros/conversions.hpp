@@ -79,7 +79,7 @@ PoseEstimate to_pose_estimate(const geometry_msgs::PoseWithCovariance& message);
 TimedPose to_timed_pose(const nav_msgs::Odometry& message);
 
 /// Pose in the map frame and twist in the base frame; what a planar filter does not estimate (z, roll, pitch) has the
-/// variance `kUnobservedVariance` (F14).
+/// variance `kUnobservedVariance`.
 nav_msgs::Odometry to_message(const LocalizationOutput& output, const Frames& frames);
 inline constexpr double kUnobservedVariance = 1e6;
 
@@ -95,7 +95,7 @@ BiasEstimate to_bias_estimate(const urban_gnss_localization::GpsBias& message);
 urban_gnss_localization::LocalizationStatus to_message(const LocalizationReport& report, const Localizer& localizer,
                                                        const ros::Time& time, const std::string& map_frame);
 
-/// The state once for each verdict, so that no decision goes unpublished where several came at once (F2). Computes the
+/// The state once for each verdict, so that no decision goes unpublished where several came at once. Computes the
 /// state once; nothing where there is no verdict.
 std::vector<urban_gnss_localization::LocalizationStatus> to_status_messages(const LocalizationPipeline& pipeline,
                                                                             const std::vector<FixVerdict>& verdicts,

@@ -7,7 +7,7 @@
 
 namespace urban_gnss {
 
-/// Watches one subscribed topic for what goes wrong in a graph: two publishers at once, a frame that changes (F9). Says
+/// Watches one subscribed topic for what goes wrong in a graph: two publishers at once, a frame that changes. Says
 /// each once a change.
 class InputWatch {
  public:

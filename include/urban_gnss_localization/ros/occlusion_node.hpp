@@ -21,7 +21,7 @@
 
 namespace urban_gnss {
 
-/// What the node is told beside OcclusionPipelineParameters and Frames; config/occlusion.yaml documents each.
+/// What the node is told beside OcclusionPipelineParameters and Frames.
 struct OcclusionNodeParameters {
   std::string prior_map{""};
   double tf_timeout{0.5};
@@ -41,6 +41,19 @@ struct OcclusionNodeParameters {
     v("map_publish_period", map_publish_period, positive(), "",
       "s between publications of the map, where somebody listens");
     v("sky_plot_size", sky_plot_size, between(50, 4000), "", "pixels, width and height of gps/sky_plot");
+  }
+};
+
+/// All that the node is told.
+struct OcclusionNodeSettings {
+  Frames frames;
+  OcclusionPipelineParameters pipeline;
+  OcclusionNodeParameters node;
+
+  void visit(ParameterVisitor& v) {
+    v.include(frames);
+    v.include(pipeline);
+    v.include(node);
   }
 };
 

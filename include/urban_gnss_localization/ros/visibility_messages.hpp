@@ -25,7 +25,7 @@ sensor_msgs::PointCloud2 to_message(const PointCloud& cloud, const ros::Time& ti
 
 std::vector<SatelliteObservation> to_observations(const urban_gnss_localization::SatelliteArray& message);
 
-/// The receiver's claim, east and north, m^2; nothing where it has none that can be used (F12).
+/// The receiver's claim, east and north, m^2; nothing where it has none that can be used.
 std::optional<Eigen::Matrix2d> claimed_covariance(const sensor_msgs::NavSatFix& fix);
 
 /// The fix with the weighted covariance in the place of the receiver's; the height's variance grows by the same factor

@@ -6,7 +6,6 @@
 #include "urban_gnss_localization/gnss/chi_squared.hpp"
 
 namespace urban_gnss {
-namespace {}  // namespace
 
 EnumNames<ParticleFilterMode> enum_names(ParticleFilterMode) {
   return {{"literal", ParticleFilterMode::kLiteral},

@@ -62,6 +62,43 @@ Gaussian ImmEkf::mixed_into(BiasMode to, const ModeTransition& transition, doubl
   return mixture_of(parts, weights);
 }
 
+ImmEkf::Branches ImmEkf::branch(const FixMeasurement& fix) const {
+  const double elapsed_s = statistics_.elapsed_s(fix.time_s);
+  const FixNoise noise = statistics_.fix_noise(fix.time_s);
+  const ModeTransition transition = mode_transition(elapsed_s, parameters_.modes, statistics_.bias_odds());
+  const Eigen::Vector4d prior = transition.transpose() * probability_;
+  Branches branches;
+  double largest = -std::numeric_limits<double>::infinity();
+  bool is_finite = true;
+  for (std::size_t j = 0; j < kContinuations; ++j) {
+    Gaussian& filter = branches.filters[j];
+    filter = mixed_into(kModes[j], transition, elapsed_s);
+    branches.updates[j] = take_fix(filter, kModes[j], fix, noise, parameters_);
+    is_finite = is_finite && filter.is_finite();
+    branches.probability[j] = std::log(prior[static_cast<int>(j)]) + branches.updates[j].log_likelihood;
+    largest = std::max(largest, branches.probability[j]);
+  }
+  branches.are_finite = is_finite && std::isfinite(largest);
+  double sum = 0.0;
+  for (double& p : branches.probability) sum += p = std::exp(p - largest);
+  for (double& p : branches.probability) p /= sum;
+  return branches;
+}
+
+void ImmEkf::merge(const Branches& branches) {
+  constexpr std::size_t kSlow = index_of(BiasMode::kSlow);
+  constexpr std::size_t kJump = index_of(BiasMode::kJump);
+  const auto& p = branches.probability;
+  const double slow = p[kSlow] + p[kJump];
+  filters_[index_of(BiasMode::kDirect)] = branches.filters[index_of(BiasMode::kDirect)];
+  filters_[index_of(BiasMode::kFast)] = branches.filters[index_of(BiasMode::kFast)];
+  if (slow > 0.0) {
+    filters_[kSlow] =
+        mixture_of<2>({branches.filters[kSlow], branches.filters[kJump]}, {p[kSlow] / slow, p[kJump] / slow});
+  }
+  probability_ << p[index_of(BiasMode::kDirect)], slow, p[index_of(BiasMode::kFast)];
+}
+
 FixVerdict ImmEkf::correct(const FixMeasurement& declared) {
   FixVerdict verdict;
   if (!is_usable(declared)) {
@@ -71,50 +108,24 @@ FixVerdict ImmEkf::correct(const FixMeasurement& declared) {
   }
   const Gaussian before = mixture();
   const FixMeasurement fix = statistics_.effective_fix(declared, before);
+  const Branches branches = branch(fix);
   verdict.of_ranges = statistics_.of_ranges();
-  const double elapsed_s = statistics_.elapsed_s(fix.time_s);
-  const FixNoise noise = statistics_.fix_noise(fix.time_s);
-  const ModeTransition transition = mode_transition(elapsed_s, parameters_.modes, statistics_.bias_odds());
-  const Eigen::Vector4d prior = transition.transpose() * probability_;
-  std::array<Gaussian, kContinuations> next;
-  std::array<BiasEkfUpdate, kContinuations> updates;
-  std::array<double, kContinuations> posterior{};
-  double largest = -std::numeric_limits<double>::infinity();
-  bool is_finite = true;
-  for (std::size_t j = 0; j < kContinuations; ++j) {
-    next[j] = mixed_into(kModes[j], transition, elapsed_s);
-    updates[j] = take_fix(next[j], kModes[j], fix, noise, parameters_);
-    is_finite = is_finite && next[j].is_finite();
-    posterior[j] = std::log(prior[static_cast<int>(j)]) + updates[j].log_likelihood;
-    largest = std::max(largest, posterior[j]);
-  }
-  verdict.nis = updates[index_of(BiasMode::kDirect)].nis;
+  verdict.nis = branches.updates[index_of(BiasMode::kDirect)].nis;
   verdict.nis_dof = kFixDof;
   verdict.nis_threshold = nis_threshold_;
-  if (!is_finite || !std::isfinite(largest)) {
+  if (!branches.are_finite) {
     verdict.decision = FixDecision::kRejectedDegenerate;
     verdict.reason = "the update is not finite";
     return verdict;
   }
-  double sum = 0.0;
-  for (double& p : posterior) sum += p = std::exp(p - largest);
   double any_outlier = 0.0;
   double exceeding = 0.0;
   for (std::size_t j = 0; j < kContinuations; ++j) {
-    any_outlier += (posterior[j] /= sum) * updates[j].outlier;
-    if (updates[j].white_nis > LearntScale::kMedianNis) exceeding += posterior[j];
+    any_outlier += branches.probability[j] * branches.updates[j].outlier;
+    if (branches.updates[j].white_nis > LearntScale::kMedianNis) exceeding += branches.probability[j];
   }
   statistics_.learn_fix(fix.time_s, exceeding);
-
-  constexpr std::size_t kSlow = index_of(BiasMode::kSlow);
-  constexpr std::size_t kJump = index_of(BiasMode::kJump);
-  const double slow = posterior[kSlow] + posterior[kJump];
-  filters_[index_of(BiasMode::kDirect)] = next[index_of(BiasMode::kDirect)];
-  filters_[index_of(BiasMode::kFast)] = next[index_of(BiasMode::kFast)];
-  if (slow > 0.0) {
-    filters_[kSlow] = mixture_of<2>({next[kSlow], next[kJump]}, {posterior[kSlow] / slow, posterior[kJump] / slow});
-  }
-  probability_ << posterior[index_of(BiasMode::kDirect)], slow, posterior[index_of(BiasMode::kFast)];
+  merge(branches);
   statistics_.compare_with_odometry(fix, before, mixture());
 
   verdict.decision = probability_[0] >= 0.5 ? FixDecision::kAccepted : FixDecision::kBiasCompensated;

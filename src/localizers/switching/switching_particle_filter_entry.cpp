@@ -7,7 +7,8 @@ LocalizerEntry switching_particle_filter_entry() {
   return {"switching_particle_filter",
           "The model of imm_ekf with particles, for a start whose heading is unknown.",
           std::make_unique<SettingsWithMotion<SwitchingParticleFilter, SwitchingParticleFilterParameters>>,
-          {{"switching", {}, true}}};
+          {{"switching", {}, true}},
+          "switching_model"};
 }
 
 }  // namespace urban_gnss

@@ -1,9 +1,8 @@
-// Runs a bag through the same core as the live nodes: offline, deterministic, as fast as the machine can.
+#include "replay.hpp"
 
 #include <rosbag/bag.h>
 #include <tf2_msgs/TFMessage.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -13,34 +12,31 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "bag_messages.hpp"
-#include "output_file.hpp"
-#include "replay_parameters.hpp"
+#include "../bag_messages.hpp"
+#include "../command_line.hpp"
+#include "../output_file.hpp"
+#include "replay_settings.hpp"
 #include "urban_gnss_localization/common/progress.hpp"
 #include "urban_gnss_localization/evaluation/report_json.hpp"
 #include "urban_gnss_localization/evaluation/tum.hpp"
-#include "urban_gnss_localization/localizers/kim/complementary_ekf.hpp"
-#include "urban_gnss_localization/localizers/maier/ukf.hpp"
-#include "urban_gnss_localization/localizers/switching/imm_ekf.hpp"
-#include "urban_gnss_localization/localizers/switching/switching_particle_filter.hpp"
 #include "urban_gnss_localization/pipeline/bias_responder.hpp"
 #include "urban_gnss_localization/ros/conversions.hpp"
 #include "urban_gnss_localization/ros/topics.hpp"
 #include "urban_gnss_localization/ros/visibility_messages.hpp"
 
-namespace fs = std::filesystem;
-using namespace urban_gnss;
-using urban_gnss_localization::SatelliteArray;
-
+namespace urban_gnss {
 namespace {
+
+namespace fs = std::filesystem;
+using urban_gnss_localization::SatelliteArray;
 
 /// The pipeline and the bias filter of one run, with what it writes.
 class Replay {
  public:
-  Replay(const ReplayOptions& options, const ReplayParameters& parameters)
-      : parameters_(parameters),
-        pipeline_(parameters.node.localization, make_localizer(options.localizer, parameters)),
-        bias_responder_(parameters.bias) {
+  Replay(const ReplayOptions& options, const ReplaySettings& settings)
+      : shell_(settings.localizer.shell),
+        pipeline_(shell_.localization, settings.localizer.localizer->make()),
+        bias_responder_(settings.gps_bias.bias.bias) {
     if (!options.output.empty()) {
       const fs::path path(options.output);
       if (path.has_parent_path()) fs::create_directories(path.parent_path());
@@ -102,15 +98,6 @@ class Replay {
   }
 
  private:
-  std::unique_ptr<Localizer> make_localizer(const std::string& name, const ReplayParameters& parameters) {
-    if (name == "particle_filter") return make_particle_filter(parameters.filter, parameters.motion);
-    if (name == "imm_ekf") return std::make_unique<ImmEkf>(parameters.imm, parameters.motion);
-    if (name == "ukf") return std::make_unique<Ukf>(parameters.ukf, parameters.motion);
-    if (name == "complementary_ekf") return std::make_unique<ComplementaryEkf>(parameters.complementary);
-    throw std::runtime_error("--localizer " + name +
-                             ": no such localizer; there are particle_filter, imm_ekf, complementary_ekf, ukf");
-  }
-
   /// Answers the pipeline's questions for the bias, as gps_bias_node does live, and writes what came of it.
   void settle() {
     write_biases(bias_responder_.answer(pipeline_));
@@ -119,22 +106,22 @@ class Replay {
     }
     for (const LocalizationOutput& output : pipeline_.take_outputs()) {
       estimate_.push_back({output.stamp, output.estimate.pose, output.estimate.covariance});
-      write(topics::kEstimate, output.stamp, to_message(output, parameters_.node.frames));
+      write(topics::kEstimate, output.stamp, to_message(output, shell_.frames));
       tf2_msgs::TFMessage tf;
-      tf.transforms.push_back(to_map_to_odom(output, parameters_.node.frames, parameters_.node.transform_time_offset));
+      tf.transforms.push_back(to_map_to_odom(output, shell_.frames, shell_.transform_time_offset));
       write("tf", output.stamp, tf);
     }
     write_biases(pipeline_.take_bias_estimates());
     const std::vector<FixVerdict> verdicts = pipeline_.take_verdicts();
     for (const FixVerdict& verdict : verdicts) ++decisions_[to_string(verdict.decision)];
-    for (const auto& status : to_status_messages(pipeline_, verdicts, to_ros(newest_), parameters_.node.frames.map)) {
+    for (const auto& status : to_status_messages(pipeline_, verdicts, to_ros(newest_), shell_.frames.map)) {
       write(topics::kStatus, newest_, status);
     }
   }
 
   void write_biases(const std::vector<BiasEstimate>& biases) {
     for (const BiasEstimate& bias : biases) {
-      write(topics::kBias, bias.stamp, to_message(bias, parameters_.node.frames.map));
+      write(topics::kBias, bias.stamp, to_message(bias, shell_.frames.map));
     }
   }
 
@@ -143,7 +130,7 @@ class Replay {
     if (bag_.isOpen()) bag_.write("/" + topic, std::max(to_ros(stamp), ros::TIME_MIN), message);
   }
 
-  ReplayParameters parameters_;
+  LocalizerNodeParameters shell_;
   LocalizationPipeline pipeline_;
   BiasResponder bias_responder_;
   rosbag::Bag bag_;
@@ -169,24 +156,30 @@ void print_summary(const Replay& replay, const nlohmann::json& metrics, double w
             << 100.0 * metrics["errors"]["coverage"].get<double>() << " %\n";
 }
 
-void run(const ReplayOptions& options) {
-  const ReplayParameters parameters = read_parameters(options);
-  if (!fs::exists(options.input)) throw std::runtime_error(options.input + ": no such bag");
-  rosbag::Bag bag(options.input, rosbag::bagmode::Read);
+/// The topics that are read, without their leading slashes.
+struct Topics {
+  explicit Topics(const ReplayOptions& options)
+      : fix(without_leading_slash(options.fix_topic)),
+        odom(without_leading_slash(options.odom_topic)),
+        imu(without_leading_slash(options.imu_topic)),
+        velocity(without_leading_slash(options.velocity_topic)),
+        satellites(without_leading_slash(options.satellites_topic)),
+        truth(without_leading_slash(options.truth_topic)) {}
 
-  const std::string fix = without_leading_slash(options.fix_topic);
-  const std::string odom = without_leading_slash(options.odom_topic);
-  const std::string imu = without_leading_slash(options.imu_topic);
-  const std::string velocity = without_leading_slash(options.velocity_topic);
-  const std::string satellites = without_leading_slash(options.satellites_topic);
-  const std::string truth = without_leading_slash(options.truth_topic);
-  const auto messages = ordered_messages(bag, {topics::kDatum, imu, odom, fix, velocity, satellites, truth});
-  const auto count = [&](const std::string& name) {
-    return std::count_if(messages.begin(), messages.end(),
-                         [&](const auto& message) { return without_leading_slash(message.getTopic()) == name; });
-  };
-  const auto require = [&](const std::string& option, const std::string& name) {
-    if (count(name) > 0) return;
+  /// In the order in which messages of one time are read.
+  std::vector<std::string> ordered() const { return {topics::kDatum, imu, odom, fix, velocity, satellites, truth}; }
+
+  std::string fix, odom, imu, velocity, satellites, truth;
+};
+
+using Messages = std::vector<rosbag::MessageInstance>;
+
+/// Throws std::runtime_error, which lists what the bag has, where a topic that is needed has no message.
+void require_topics(const rosbag::Bag& bag, const Messages& messages, const ReplayOptions& options,
+                    const Topics& names) {
+  const auto require = [&](bool is_needed, const std::string& option, const std::string& name) {
+    const auto is_of_it = [&](const auto& message) { return without_leading_slash(message.getTopic()) == name; };
+    if (!is_needed || std::any_of(messages.begin(), messages.end(), is_of_it)) return;
     std::string present;
     rosbag::View all(bag);
     for (const rosbag::ConnectionInfo* connection : all.getConnections()) {
@@ -194,46 +187,40 @@ void run(const ReplayOptions& options) {
     }
     throw std::runtime_error(options.input + " has no message on " + name + " (" + option + "); it has" + present);
   };
-  require("--fix-topic", fix);
-  require("--odom-topic", odom);
-  if (options.wants_imu) require("--imu-topic", imu);
-  if (options.wants_velocity) require("--velocity-topic", velocity);
-  if (options.wants_satellites) require("--satellites-topic", satellites);
+  require(true, "--fix-topic", names.fix);
+  require(true, "--odom-topic", names.odom);
+  require(options.wants_imu, "--imu-topic", names.imu);
+  require(options.wants_velocity, "--velocity-topic", names.velocity);
+  require(options.wants_satellites, "--satellites-topic", names.satellites);
+}
 
-  Replay replay(options, parameters);
-  Progress progress(messages.size(), "messages");
-  const auto start = std::chrono::steady_clock::now();
-  std::size_t done = 0;
-  for (const rosbag::MessageInstance& message : messages) {
-    const std::string name = without_leading_slash(message.getTopic());
-    if (name == odom) {
-      replay.add_odometry(*expect<nav_msgs::Odometry>(message));
-    } else if (name == fix) {
-      replay.add_fix(*expect<sensor_msgs::NavSatFix>(message));
-    } else if (name == velocity) {
-      const auto measured = to_raw_velocity_of(message);
-      if (!measured) throw wrong_type(message, kVelocityTypes);
-      replay.add_velocity(*measured);
-    } else if (name == satellites) {
-      replay.add_satellites(*expect<SatelliteArray>(message));
-    } else if (name == imu) {
-      replay.add_imu(*expect<sensor_msgs::Imu>(message));
-    } else if (name == truth) {
-      replay.add_truth(*expect<nav_msgs::Odometry>(message));
-    } else {
-      replay.set_datum(*expect<sensor_msgs::NavSatFix>(message));
-    }
-    progress.report(++done);
+void add_message(const rosbag::MessageInstance& message, const Topics& names, Replay& replay) {
+  const std::string name = without_leading_slash(message.getTopic());
+  if (name == names.odom) {
+    replay.add_odometry(*expect<nav_msgs::Odometry>(message));
+  } else if (name == names.fix) {
+    replay.add_fix(*expect<sensor_msgs::NavSatFix>(message));
+  } else if (name == names.velocity) {
+    const auto measured = to_raw_velocity_of(message);
+    if (!measured) throw wrong_type(message, kVelocityTypes);
+    replay.add_velocity(*measured);
+  } else if (name == names.satellites) {
+    replay.add_satellites(*expect<SatelliteArray>(message));
+  } else if (name == names.imu) {
+    replay.add_imu(*expect<sensor_msgs::Imu>(message));
+  } else if (name == names.truth) {
+    replay.add_truth(*expect<nav_msgs::Odometry>(message));
+  } else {
+    replay.set_datum(*expect<sensor_msgs::NavSatFix>(message));
   }
-  progress.finish();
-  replay.close();
-  const double wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
 
+nlohmann::json metrics_of(const ReplayOptions& options, const ReplaySettings& settings, const Replay& replay) {
   const LocalizationReport report = replay.pipeline().report();
   nlohmann::json metrics = {{"bag", fs::path(options.input).filename().string()},
-                            {"localizer", options.localizer},
+                            {"localizer", replay.pipeline().localizer().name()},
                             {"mode", replay.pipeline().localizer().mode()},
-                            {"seed", parameters.filter.seed},
+                            {"seed", settings.seed},
                             {"estimates", replay.estimate().size()},
                             {"decisions", replay.decisions()},
                             {"fixes_with_ranges", report.fixes_with_ranges},
@@ -245,12 +232,40 @@ void run(const ReplayOptions& options) {
   if (const auto reference = replay.truth()) {
     metrics["errors"] = to_json(errors_at_truth(*reference, replay.estimate()).summary);
   }
+  return metrics;
+}
+
+void write_results(const ReplayOptions& options, const nlohmann::json& metrics, const Replay& replay) {
   if (!options.json_file.empty()) {
     write_file(options.json_file, [&](std::ostream& out) { out << metrics.dump(2) << '\n'; });
   }
   if (!options.tum_file.empty()) {
     write_file(options.tum_file, [&](std::ostream& out) { write_tum(out, replay.estimate()); });
   }
+}
+
+void run(const ReplayOptions& options, const LocalizerRegistry& localizers) {
+  const ReplaySettings settings = read_settings(options, localizers);
+  if (!fs::exists(options.input)) throw std::runtime_error(options.input + ": no such bag");
+  rosbag::Bag bag(options.input, rosbag::bagmode::Read);
+  const Topics names(options);
+  const Messages messages = ordered_messages(bag, names.ordered());
+  require_topics(bag, messages, options, names);
+
+  Replay replay(options, settings);
+  Progress progress(messages.size(), "messages");
+  const auto start = std::chrono::steady_clock::now();
+  std::size_t done = 0;
+  for (const rosbag::MessageInstance& message : messages) {
+    add_message(message, names, replay);
+    progress.report(++done);
+  }
+  progress.finish();
+  replay.close();
+  const double wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+
+  const nlohmann::json metrics = metrics_of(options, settings, replay);
+  write_results(options, metrics, replay);
   const double bag_s = messages.empty() ? 0.0 : (messages.back().getTime() - messages.front().getTime()).toSec();
   print_summary(replay, metrics, wall_s, bag_s);
   if (replay.estimate().empty()) {
@@ -258,16 +273,23 @@ void run(const ReplayOptions& options) {
   }
 }
 
+void print_variants(const LocalizerRegistry& localizers) {
+  for (const LocalizerVariant& variant : localizers.variants()) std::cout << variant.name << '\n';
+}
+
 }  // namespace
 
-int main(int argc, char** argv) {
+int replay_main(int argc, char** argv, const LocalizerRegistry& localizers) {
   ReplayOptions options;
-  CLI::App app("Runs a bag through a localizer offline; the same input, parameters and seed give the same output.");
-  app.option_defaults()->always_capture_default();
-  app.add_option("bag", options.input, "the bag to read")->required();
-  app.add_option("--localizer", options.localizer, "particle_filter, imm_ekf, complementary_ekf or ukf");
+  CommandLine line("replay",
+                   "Runs a bag through a localizer offline; the same input, parameters and seed give the same output.");
+  CLI::App& app = line.app();
+  auto* input = app.add_option("bag", options.input, "the bag to read");
+  bool only_names = false;
+  app.add_flag("--list-variants", only_names, "print the names under which localizers are compared, and end");
+  app.add_option("--localizer", options.localizer, localizers.names() + ", or a name of --list-variants");
   app.add_option("--params", options.params, "YAML with the nodes' parameters; repeatable, later files win");
-  app.add_option("--set", options.overrides, "one parameter, NAME=VALUE; repeatable");
+  line.add_set("--set", options.overrides, "a parameter of the localizer, or after gps_bias. of the bias filter");
   app.add_option("--output", options.output, "bag to write: odometry/filtered, gps/bias, status, tf");
   app.add_option("--fix-topic", options.fix_topic, "sensor_msgs/NavSatFix");
   app.add_option("--odom-topic", options.odom_topic, "nav_msgs/Odometry");
@@ -286,17 +308,16 @@ int main(int argc, char** argv) {
       ->delimiter(',')
       ->expected(3);
   app.add_option("--seed", options.seed, "seed of the random numbers; default: as in the parameters");
-  app.add_option("--json", options.json_file, "write decisions and errors here");
+  line.add_json(options.json_file);
   app.add_option("--tum", options.tum_file, "write the trajectory here (TUM format, ENU about the datum)");
-  CLI11_PARSE(app, argc, argv);
-  options.wants_velocity = velocity_topic->count() > 0 && !options.velocity_topic.empty();
-  options.wants_satellites = satellites_topic->count() > 0 && !options.satellites_topic.empty();
-  options.wants_imu = imu_topic->count() > 0 && !options.imu_topic.empty();
-  try {
-    run(options);
-  } catch (const std::exception& error) {
-    std::cerr << "replay: " << error.what() << '\n';
-    return 1;
-  }
-  return 0;
+  return line.run(argc, argv, [&] {
+    if (only_names) return print_variants(localizers);
+    if (input->count() == 0) throw std::runtime_error("which bag? See --help");
+    options.wants_velocity = velocity_topic->count() > 0 && !options.velocity_topic.empty();
+    options.wants_satellites = satellites_topic->count() > 0 && !options.satellites_topic.empty();
+    options.wants_imu = imu_topic->count() > 0 && !options.imu_topic.empty();
+    run(options, localizers);
+  });
 }
+
+}  // namespace urban_gnss

@@ -50,6 +50,16 @@ class ImmEkf : public Localizer {
   Gaussian mixture() const;
 
  private:
+  /// The filters of all modes that a fix may have, each with the fix taken.
+  struct Branches {
+    std::array<Gaussian, kContinuations> filters;
+    std::array<BiasEkfUpdate, kContinuations> updates;
+    std::array<double, kContinuations> probability{};  ///< posterior, of the modes
+    bool are_finite{false};
+  };
+  Branches branch(const FixMeasurement& fix) const;
+  /// Goes on with the filters of the branches, those of slow bias and of a jump as one.
+  void merge(const Branches& branches);
   Gaussian mixed_into(BiasMode to, const ModeTransition& transition, double elapsed_s) const;
 
   ImmEkfParameters parameters_;

@@ -13,7 +13,7 @@ namespace urban_gnss {
 
 /// The Rao-Blackwellized particle filter of a switching bias. A particle is a history of modes (BiasMode), and the
 /// heading that it began with where that was not known; given these, pose, odometry errors and bias are Gaussian, and
-/// each particle has the extended Kalman filter that imm_ekf has for each mode (filters/bias_ekf.hpp).
+/// each particle has the extended Kalman filter that imm_ekf has for each mode (localizers/switching/bias_ekf.hpp).
 ///
 /// At a fix every particle goes on in every mode, with the transition probabilities of the time since the last fix.
 /// Those that then are nearly the same are merged; each takes the fix, which weighs it; of the light ones a few survive

@@ -1,0 +1,63 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "urban_gnss_localization/occlusion/voxel_walk.hpp"
+
+/// Bit masks of the voxels of a VoxelMap's cell, and of the cells of its brick: 4 x 4 x 4 places each.
+namespace urban_gnss::cell_bits {
+
+inline constexpr int kSide = 4;
+inline constexpr std::uint32_t kPlaces = 64;
+
+/// The bit of a neighbour, or of the cell itself, among the 27 cells about one.
+inline std::uint32_t nearby_bit(int dx, int dy, int dz) {
+  return 1U << static_cast<unsigned>(9 * (dx + 1) + 3 * (dy + 1) + dz + 1);
+}
+
+/// The place of a cell in its brick, and of a voxel in its cell: octant by octant, so that neighbours are close.
+inline std::uint32_t place_of(const VoxelCoordinates& at) {
+  const int place = (at.x() & 1) | (at.y() & 1) << 1 | (at.z() & 1) << 2 |  //
+                    (at.x() & 2) << 2 | (at.y() & 2) << 3 | (at.z() & 2) << 4;
+  return static_cast<std::uint32_t>(place);
+}
+
+inline std::uint64_t bit_of(const VoxelCoordinates& voxel) { return std::uint64_t{1} << place_of(voxel); }
+/// The coordinates in the brick, or in the cell, of this place.
+inline VoxelCoordinates at_place(std::uint32_t place) {
+  const auto bits = [place](unsigned axis) {
+    return static_cast<int>((place >> axis & 1U) | (place >> axis >> 2U & 2U));
+  };
+  return {bits(0), bits(1), bits(2)};
+}
+
+/// How many of a cell's voxels come before this one: the number of bits below it, in the registers of any machine.
+inline std::uint32_t rank(std::uint64_t mask, std::uint64_t bit) {
+  std::uint64_t below = mask & (bit - 1);
+  below -= below >> 1U & 0x5555555555555555U;
+  below = (below & 0x3333333333333333U) + (below >> 2U & 0x3333333333333333U);
+  below = (below + (below >> 4U)) & 0x0F0F0F0F0F0F0F0FU;
+  return static_cast<std::uint32_t>(below * 0x0101010101010101U >> 56U);
+}
+
+/// For each axis the bits of a cell's voxels from the first, second, third or fourth on, or of none.
+inline constexpr std::array<std::array<std::uint64_t, kSide + 1>, 3> kFrom{{
+    {~0ULL, 0xFFAAFFAAFFAAFFAAU, 0xFF00FF00FF00FF00U, 0xAA00AA00AA00AA00U, 0U},
+    {~0ULL, 0xFFFFCCCCFFFFCCCCU, 0xFFFF0000FFFF0000U, 0xCCCC0000CCCC0000U, 0U},
+    {~0ULL, 0xFFFFFFFFF0F0F0F0U, 0xFFFFFFFF00000000U, 0xF0F0F0F000000000U, 0U},
+}};
+/// The bits of this cell's voxels that are from `low` to `high` along one axis.
+inline std::uint64_t slab(std::size_t axis, const VoxelCoordinates& cell, const VoxelCoordinates& low,
+                          const VoxelCoordinates& high) {
+  const auto place = static_cast<Eigen::Index>(axis);
+  const int corner = kSide * cell[place];
+  const auto from = [&](int voxel) {
+    return kFrom[axis][static_cast<std::size_t>(std::min(std::max(voxel - corner, 0), kSide))];
+  };
+  return from(low[place]) & ~from(high[place] + 1);
+}
+
+}  // namespace urban_gnss::cell_bits

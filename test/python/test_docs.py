@@ -1,0 +1,167 @@
+#!/usr/bin/env python3
+"""The pages hold together: links lead somewhere, named files and functions exist, lines can be read."""
+import os
+import re
+import tempfile
+import unittest
+
+PACKAGE = "urban_gnss_localization"
+MAX_LINE = 120  # characters; rows of tables excepted
+SOURCE = re.compile(r"`((?:\w+/)+\w+)\.([ch]pp)`")
+FUNCTION = re.compile(r"`(?:\w+::)*(\w+)\(\)`")
+
+
+def find_root():
+    """The folder of package.xml, above this file."""
+    folder = os.path.dirname(os.path.abspath(__file__))
+    while not os.path.exists(os.path.join(folder, "package.xml")):
+        folder = os.path.dirname(folder)
+    return folder
+
+
+ROOT = find_root()
+
+
+def read_text(path):
+    """A file's text."""
+    with open(path, encoding="utf-8") as file:
+        return file.read()
+
+
+def pages(root):
+    """Every Markdown page: those at the top and those of docs/."""
+    found = [os.path.join(root, name) for name in sorted(os.listdir(root)) if name.endswith(".md")]
+    for folder, _, names in sorted(os.walk(os.path.join(root, "docs"))):
+        found += [os.path.join(folder, name) for name in sorted(names) if name.endswith(".md")]
+    return found
+
+
+def prose(text):
+    """The text with its code blocks emptied, line by line as it was."""
+    inside = False
+    for line in text.splitlines():
+        fence = line.lstrip().startswith("```")
+        yield "" if inside or fence else line
+        inside ^= fence
+
+
+def anchors(text):
+    """The anchors of a page's headings, as GitHub makes them."""
+    headings = [re.sub(r"^#+ ", "", line) for line in prose(text) if re.match(r"#+ ", line)]
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+def fault_of_link(page, link):
+    """What is wrong with a link of a page; empty where nothing is."""
+    if re.match(r"\w+:", link):
+        return ""
+    path, _, anchor = link.partition("#")
+    target = os.path.normpath(os.path.join(os.path.dirname(page), path)) if path else page
+    if not os.path.exists(target):
+        return "no such file"
+    if anchor and anchor not in anchors(read_text(target)):
+        return "no such heading"
+    return ""
+
+
+def source_text(root, stem):
+    """Header and source of this name; empty where there is neither."""
+    stem = re.sub("^src/", "", stem)
+    paths = [os.path.join(root, folder, stem + end) for folder in ("src", "include/" + PACKAGE) for end in
+             (".cpp", ".hpp")]
+    return "".join(read_text(path) for path in paths if os.path.exists(path))
+
+
+def faults_of_names(root, line):
+    """Source files that a line names and that are not there, and functions that the file before them does not have."""
+    faults = []
+    text = None
+    for found in re.finditer(SOURCE.pattern + "|" + FUNCTION.pattern, line):
+        stem, _, function = found.groups()
+        if stem:
+            text = source_text(root, stem)
+            if not text:
+                faults.append("no such file: " + stem)
+        elif text and not re.search(r"\b" + function + r"\(", text):
+            faults.append("no such function there: " + function)
+    return faults
+
+
+def find_faults(root):
+    """page:line of everything that is wrong."""
+    faults = []
+    for page in pages(root):
+        name = os.path.relpath(page, root)
+        text = read_text(page)
+        for number, line in enumerate(text.splitlines(), 1):
+            if len(line) > MAX_LINE and not line.lstrip().startswith("|"):
+                faults.append("{}:{}: {} characters".format(name, number, len(line)))
+        for number, line in enumerate(prose(text), 1):
+            for link in re.findall(r"\]\(([^)\s]+)\)", line):
+                fault = fault_of_link(page, link)
+                if fault:
+                    faults.append("{}:{}: {}: {}".format(name, number, link, fault))
+        # A sentence goes on in the next line, so paragraphs are looked at as a whole.
+        for paragraph in re.split(r"\n\s*\n|\n(?=[-\d|])", "\n".join(prose(text))):
+            faults += ["{}: {}".format(name, fault) for fault in faults_of_names(root, paragraph)]
+    return faults
+
+
+class Repository(unittest.TestCase):
+    """The pages of this repository."""
+
+    def test_pages(self):
+        faults = find_faults(ROOT)
+        self.assertEqual([], faults, "\n" + "\n".join(faults))
+
+    def test_every_page_is_in_the_index(self):
+        index = read_text(os.path.join(ROOT, "docs", "index.md"))
+        for page in pages(ROOT):
+            name = os.path.relpath(page, os.path.join(ROOT, "docs"))
+            if not name.startswith("..") and name != "index.md":
+                self.assertIn("(" + name.replace(os.sep, "/") + ")", index)
+
+    def test_comments_name_pages_that_exist(self):
+        for top in ("src", "include", "launch", "config", "reports", "scripts", "dev"):
+            for folder, _, names in os.walk(os.path.join(ROOT, top)):
+                for name in names:
+                    if not name.endswith((".cpp", ".hpp", ".launch", ".yaml", ".py", ".sh")):
+                        continue
+                    for page in re.findall(r"\bdocs/[\w/]+\.(?:md|png)", read_text(os.path.join(folder, name))):
+                        self.assertTrue(os.path.exists(os.path.join(ROOT, page)), name + ": " + page)
+
+
+class Check(unittest.TestCase):
+    """It fails where it must."""
+
+    def faults(self, text, name="docs/page.md"):
+        with tempfile.TemporaryDirectory() as root:
+            os.makedirs(os.path.join(root, "docs"))
+            os.makedirs(os.path.join(root, "src/gnss"))
+            for path, content in ((name, text), ("docs/other.md", "# A heading, eq. (2)\n"),
+                                  ("src/gnss/fix.cpp", "int sanitize(int a) { return a; }\n")):
+                with open(os.path.join(root, path), "w", encoding="utf-8") as file:
+                    file.write(content)
+            return find_faults(root)
+
+    def test_good_page(self):
+        self.assertEqual([], self.faults(
+            "# Top\n[a](other.md) [b](other.md#a-heading-eq-2) [c](#top) [d](https://x.org/y)\n"
+            "`gnss/fix.cpp`: it\nhas `sanitize()`.\n| " + "x" * 200 + " |\n```\n# no heading [e](gone.md)\n```\n"))
+
+    def test_bad_pages(self):
+        for text, fault in (("[a](gone.md)", "docs/page.md:1: gone.md: no such file"),
+                            ("\n![a](gone.png)", "docs/page.md:2: gone.png: no such file"),
+                            ("[a](other.md#gone)", "docs/page.md:1: other.md#gone: no such heading"),
+                            ("ä" * 121, "docs/page.md:1: 121 characters"),
+                            ("in `gnss/gone.hpp`", "docs/page.md: no such file: gnss/gone"),
+                            ("`gnss/fix.cpp`: `gone()`", "docs/page.md: no such function there: gone"),
+                            ("`gnss/fix.cpp`\nand `anize()`", "docs/page.md: no such function there: anize")):
+            self.assertEqual([fault], self.faults(text), text)
+
+    def test_readme_is_a_page(self):
+        self.assertEqual(["README.md:1: docs/gone.md: no such file"], self.faults("[a](docs/gone.md)", "README.md"))
+
+
+if __name__ == "__main__":
+    unittest.main()
