@@ -98,7 +98,7 @@ TEST(SatellitesOfFixes, AreWaitedForAtMostSatellitesWait) {
 TEST(SatellitesOfFixes, WaitIsNotNegative) {
   for (const auto& [value, fault_count] : {std::pair{"0.0", 0u}, {"-0.1", 1u}, {".nan", 1u}}) {
     LocalizationParameters parameters;
-    ParameterReader reader(grouped(parameters, YAML::Load(std::string("satellites_wait: ") + value)));
+    ParameterReader reader(YAML::Load(std::string("satellites_wait: ") + value));
     reader.read(parameters);
     EXPECT_EQ(reader.finish().size(), fault_count) << value;
   }

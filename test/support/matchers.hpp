@@ -12,7 +12,6 @@
 #include "urban_gnss_localization/common/random.hpp"
 #include "urban_gnss_localization/localizers/particle_set.hpp"
 #include "urban_gnss_localization/geometry/pose2.hpp"
-#include "urban_gnss_localization/parameters/assignment.hpp"
 #include "urban_gnss_localization/parameters/parameter_list.hpp"
 #include "urban_gnss_localization/parameters/parameter_reader.hpp"
 
@@ -90,27 +89,11 @@ inline ParticleSet random_particles(std::size_t count, RandomEngine& engine, dou
   return particles;
 }
 
-/// Where the parameters of a flat YAML map stand in a struct, by their names alone: groups need not be written.
-template <class P>
-YAML::Node grouped(const P& parameters, const YAML::Node& flat) {
-  const ParameterList list = ParameterList().add(parameters);
-  YAML::Node map(YAML::NodeType::Map);
-  for (const auto& entry : flat) {
-    const auto name = entry.first.as<std::string>();
-    std::vector<std::string> paths;
-    for (const ListedParameter& listed : list.parameters()) {
-      if (listed.name == name) paths.push_back(listed.path(Layout::kPlain));
-    }
-    if (paths.size() > 1) ADD_FAILURE() << name << " stands in several groups";
-    assign(map, (paths.empty() ? name : paths.front()) + "=" + YAML::Dump(entry.second));
-  }
-  return map;
-}
-
-/// `parameters` with what a YAML text says otherwise, by the names of the parameters.
+/// `parameters` with what a YAML text says otherwise, by the names that users write.
 template <class P>
 P with(P parameters, const std::string& yaml) {
-  ParameterReader reader(grouped(parameters, YAML::Load(yaml)));
+  const YAML::Node map = YAML::Load(yaml);
+  ParameterReader reader(map);
   reader.read(parameters);
   for (const std::string& fault : reader.finish()) ADD_FAILURE() << fault;
   return parameters;
