@@ -97,9 +97,8 @@ TEST(SatellitesOfFixes, AreWaitedForAtMostSatellitesWait) {
 
 TEST(SatellitesOfFixes, WaitIsNotNegative) {
   for (const auto& [value, fault_count] : {std::pair{"0.0", 0u}, {"-0.1", 1u}, {".nan", 1u}}) {
-    const YAML::Node map = YAML::Load(std::string("satellites_wait: ") + value);
-    ParameterReader reader(map);
     LocalizationParameters parameters;
+    ParameterReader reader(YAML::Load(std::string("satellites_wait: ") + value));
     reader.read(parameters);
     EXPECT_EQ(reader.finish().size(), fault_count) << value;
   }

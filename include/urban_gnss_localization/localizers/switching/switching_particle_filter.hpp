@@ -1,15 +1,35 @@
 #pragma once
 
 #include <cstdint>
-#include <memory>
 #include <vector>
 
-#include "urban_gnss_localization/localizers/nishida/particle_filter.hpp"
 #include "urban_gnss_localization/localizers/particle_localizer.hpp"
+#include "urban_gnss_localization/localizers/switching/bias_ekf.hpp"
 #include "urban_gnss_localization/localizers/switching/fix_statistics.hpp"
 #include "urban_gnss_localization/localizers/switching/mixture_reduction.hpp"
 
 namespace urban_gnss {
+
+struct SwitchingParticleFilterParameters {
+  int max_particles{100};
+  double merge_distance{0.5};
+  EstimateMethod estimate{EstimateMethod::kHeaviestCluster};
+  double cluster_cell{1.0};
+  int seed{1};
+  SwitchingModelParameters model;
+
+  void visit(ParameterVisitor& v) {
+    v("max_particles", max_particles, between(1, 10000), "",
+      "each is an extended Kalman filter; there are as many as are plausible");
+    v("merge_distance", merge_distance, non_negative(), "",
+      "Bhattacharyya distance below which particles of a mode become one; large: imm_ekf");
+    v("estimate", estimate, "mean of all particles, or of the heaviest_cluster");
+    v("cluster_cell", cluster_cell, positive(), "m",
+      "added to the standard deviations of two particles, three of which may lie between them in a cluster");
+    v("seed", seed, any_number(), "", "of the random numbers; the same bag and seed give the same estimates");
+    v.include(model);
+  }
+};
 
 /// The Rao-Blackwellized particle filter of a switching bias. A particle is a history of modes (BiasMode), and the
 /// heading that it began with where that was not known; given these, pose, odometry errors and bias are Gaussian, and
@@ -28,10 +48,10 @@ namespace urban_gnss {
 class SwitchingParticleFilter : public ParticleLocalizer {
  public:
   /// Requires parameters without faults.
-  SwitchingParticleFilter(const ParticleFilterParameters& parameters, const MotionParameters& motion);
+  SwitchingParticleFilter(const SwitchingParticleFilterParameters& parameters, const MotionParameters& motion);
 
-  const char* name() const override { return "particle_filter"; }
-  std::string mode() const override { return enum_name(ParticleFilterMode::kSwitching); }
+  const char* name() const override { return "switching_particle_filter"; }
+  std::string mode() const override { return "switching"; }
   bool wants_bias() const override { return false; }
   bool takes_velocity() const override { return true; }
   bool takes_satellites() const override { return parameters_.model.ranges.use_ranges; }
@@ -67,7 +87,7 @@ class SwitchingParticleFilter : public ParticleLocalizer {
   void update_estimate();
   void draw_cloud();
 
-  ParticleFilterParameters parameters_;
+  SwitchingParticleFilterParameters parameters_;
   MotionParameters motion_;
   double nis_threshold_;
   std::size_t most_;
@@ -82,9 +102,5 @@ class SwitchingParticleFilter : public ParticleLocalizer {
   std::uint32_t heaviest_{0};           ///< cluster
   std::vector<Eigen::Vector3d> draws_;  ///< of each particle's pose in the cloud, standard normal
 };
-
-/// The particle filter of the mode that the parameters say.
-std::unique_ptr<ParticleLocalizer> make_particle_filter(const ParticleFilterParameters& parameters,
-                                                        const MotionParameters& motion);
 
 }  // namespace urban_gnss
