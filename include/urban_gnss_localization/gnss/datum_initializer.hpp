@@ -17,7 +17,8 @@ struct DatumParameters {
   double datum_max_spread{15.0};
 
   void visit(ParameterVisitor& v) {
-    v("datum", datum, "deg", "deg, m: latitude, longitude, altitude; empty: gps/datum or the first fixes");
+    v.basic()("datum", datum, "deg, deg, m",
+              "latitude, longitude and altitude of the map frame's origin; empty: gps/datum or the first fixes");
     v("datum_fix_count", datum_fix_count, between(1, 1000), "", "of fixes that must agree on it");
     v("datum_max_spread", datum_max_spread, positive(), "m", "farthest that one of these may lie from their median");
   }
