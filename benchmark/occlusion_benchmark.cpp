@@ -148,9 +148,9 @@ std::vector<PointCloud> scans(std::vector<Eigen::Vector3d>& sensors, std::size_t
       const double azimuth = 2.0 * M_PI * draw_uniform(engine);
       const Eigen::Vector3d direction(std::cos(elevation) * std::cos(azimuth), std::cos(elevation) * std::sin(azimuth),
                                       std::sin(elevation));
-      const RayVerdict verdict = tracer.trace(sensor, direction);
-      if (!verdict.blocked || verdict.range_m > 100.0) continue;
-      scan.push_back((sensor + (verdict.range_m + 0.02 * draw_normal(engine)) * direction).cast<float>());
+      const RayOutcome outcome = tracer.trace(sensor, direction);
+      if (!outcome.blocked || outcome.range_m > 100.0) continue;
+      scan.push_back((sensor + (outcome.range_m + 0.02 * draw_normal(engine)) * direction).cast<float>());
     }
     result.push_back(scan);
     sensors.push_back(sensor);

@@ -51,7 +51,7 @@ class Contestant {
     }
     for (BiasEstimate& bias : pipeline_->take_bias_estimates()) run_.biases.push_back(std::move(bias));
     pipeline_->take_events();
-    pipeline_->take_verdicts();
+    pipeline_->take_outcomes();
   }
 
   bool is_withheld_;

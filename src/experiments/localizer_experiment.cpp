@@ -81,7 +81,7 @@ class Participant : public DriveParticipant {
           {output.stamp, map_to_odometry(output), std::sqrt(std::max(0.0, output.estimate.covariance(2, 2)))});
     }
     localization_.take_events();
-    localization_.take_verdicts();
+    localization_.take_outcomes();
   }
 
   LocalFrame frame_;

@@ -81,7 +81,7 @@ class Contestant {
                       std::sqrt(std::max(0.0, output.estimate.covariance(2, 2)))};
       }
       filters_[i]->take_events();
-      filters_[i]->take_verdicts();
+      filters_[i]->take_outcomes();
     }
   }
 

@@ -74,7 +74,7 @@ class Estimator {
       LocalFix local{from_seconds(time_s), fix.position, measurement.covariance};
       const BiasEstimate& bias = bias_.process(local, filter_->pose().position());
       radius_ = bias.radius_m;
-      if (is_rejected(bias.verdict.decision)) return;
+      if (is_rejected(bias.outcome.decision)) return;
     }
     measurement.bias_radius_m = radius_;
     filter_->correct(measurement);

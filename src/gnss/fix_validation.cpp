@@ -14,8 +14,8 @@ std::string number(double value) {
   return out.str();
 }
 
-void add_reason(FixVerdict& verdict, const std::string& reason) {
-  verdict.reason += (verdict.reason.empty() ? "" : "; ") + reason;
+void add_reason(FixOutcome& outcome, const std::string& reason) {
+  outcome.reason += (outcome.reason.empty() ? "" : "; ") + reason;
 }
 
 struct Rejection {
@@ -79,7 +79,7 @@ std::optional<HorizontalCovariance> declared_covariance(const RawFix& raw) {
 }
 
 Eigen::Matrix2d clamp_covariance(HorizontalCovariance declared, const FixValidationParameters& parameters,
-                                 FixVerdict& verdict) {
+                                 FixOutcome& outcome) {
   const double floor = parameters.fix_sigma_floor;
   const double ceiling = parameters.fix_sigma_ceiling;
   // The eigenvalues of diag(1e300, 1) have no digits left for the 1. What is far above the ceiling ends at the ceiling.
@@ -95,27 +95,27 @@ Eigen::Matrix2d clamp_covariance(HorizontalCovariance declared, const FixValidat
   const bool is_above = variances.maxCoeff() > ceiling * ceiling;
   if (!is_below && !is_above) return covariance;
 
-  verdict.covariance_clamped = true;
+  outcome.covariance_clamped = true;
   if (is_below) {
-    verdict.decision = FixDecision::kInflated;
+    outcome.decision = FixDecision::kInflated;
     const double smallest = std::sqrt(std::max(variances.minCoeff(), 0.0));
-    add_reason(verdict, "declared sigma " + number(smallest) + " m raised to the floor of " + number(floor) + " m");
+    add_reason(outcome, "declared sigma " + number(smallest) + " m raised to the floor of " + number(floor) + " m");
   }
-  if (is_above) add_reason(verdict, "declared sigma lowered to the ceiling of " + number(ceiling) + " m");
+  if (is_above) add_reason(outcome, "declared sigma lowered to the ceiling of " + number(ceiling) + " m");
   const Eigen::Vector2d clamped = variances.max(floor * floor).min(ceiling * ceiling);
   const Eigen::Matrix2d& axes = ellipse.eigenvectors();
   const Eigen::Matrix2d product = axes * clamped.asDiagonal() * axes.transpose();
   return 0.5 * (product + product.transpose());
 }
 
-Eigen::Matrix2d usable_covariance(const RawFix& raw, const FixValidationParameters& parameters, FixVerdict& verdict) {
+Eigen::Matrix2d usable_covariance(const RawFix& raw, const FixValidationParameters& parameters, FixOutcome& outcome) {
   const bool is_unknown = raw.covariance_type == CovarianceType::kUnknown;
   const auto declared = is_unknown ? std::nullopt : declared_covariance(raw);
-  if (declared) return clamp_covariance(*declared, parameters, verdict);
+  if (declared) return clamp_covariance(*declared, parameters, outcome);
   const double sigma = parameters.fix_sigma_default;
-  verdict.decision = FixDecision::kInflated;
-  verdict.covariance_clamped = true;
-  add_reason(verdict, std::string(is_unknown ? "no covariance declared" : "declared covariance cannot be used") +
+  outcome.decision = FixDecision::kInflated;
+  outcome.covariance_clamped = true;
+  add_reason(outcome, std::string(is_unknown ? "no covariance declared" : "declared covariance cannot be used") +
                           ": default sigma " + number(sigma) + " m");
   return sigma * sigma * Eigen::Matrix2d::Identity();
 }
@@ -138,26 +138,26 @@ ValidatedFix validate_fix(const RawFix& raw, const LocalFrame& frame, std::optio
                           const FixValidationParameters& parameters) {
   ValidatedFix result;
   result.fix.stamp = raw.stamp;
-  FixVerdict& verdict = result.verdict;
-  verdict.stamp = raw.stamp;
+  FixOutcome& outcome = result.outcome;
+  outcome.stamp = raw.stamp;
 
   std::optional<Rejection> rejection = reject_position(raw);
   if (!rejection) rejection = reject_stamp(raw.stamp, last_stamp);
   if (!rejection) rejection = reject_distance(raw, frame, parameters.max_distance_from_datum);
   if (rejection) {
-    verdict.decision = rejection->decision;
-    verdict.reason = rejection->reason;
+    outcome.decision = rejection->decision;
+    outcome.reason = rejection->reason;
     return result;
   }
 
-  verdict.decision = FixDecision::kAccepted;
+  outcome.decision = FixDecision::kAccepted;
   GeodeticPosition position = raw.position;
   if (!is_altitude(position.altitude_m)) {
-    add_reason(verdict, "no usable altitude: the datum's is used");
+    add_reason(outcome, "no usable altitude: the datum's is used");
     position.altitude_m = frame.datum().altitude_m;
   }
   result.fix.position = frame.to_local(position).head<2>();
-  result.fix.covariance = usable_covariance(raw, parameters, verdict);
+  result.fix.covariance = usable_covariance(raw, parameters, outcome);
   return result;
 }
 

@@ -94,8 +94,8 @@ class GpsBiasNode {
     }
     status.add("bias radius (m)", last_.radius_m);
     status.add("shadow statistic", last_.shadow_statistic);
-    status.add("last fix", to_string(last_.verdict.decision));
-    status.add("last NIS", last_.verdict.nis);
+    status.add("last fix", to_string(last_.outcome.decision));
+    status.add("last NIS", last_.outcome.nis);
   }
 
   Frames frames_;

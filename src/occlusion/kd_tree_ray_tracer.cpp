@@ -32,9 +32,9 @@ KdTreeRayTracer::KdTreeRayTracer(const PointCloud& cloud, const KdTreeRayTracerP
 
 KdTreeRayTracer::~KdTreeRayTracer() = default;
 
-RayVerdict KdTreeRayTracer::trace(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const {
-  RayVerdict verdict;
-  if (tree_->bounds.isEmpty() || !origin.allFinite() || !direction.allFinite()) return verdict;
+RayOutcome KdTreeRayTracer::trace(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const {
+  RayOutcome outcome;
+  if (tree_->bounds.isEmpty() || !origin.allFinite() || !direction.allFinite()) return outcome;
   const auto& p = parameters_;
   const auto min_neighbours = static_cast<unsigned>(p.min_neighbours);
   std::vector<int> neighbours;
@@ -46,12 +46,12 @@ RayVerdict KdTreeRayTracer::trace(const Eigen::Vector3d& origin, const Eigen::Ve
     const pcl::PointXYZ query(static_cast<float>(q.x()), static_cast<float>(q.y()), static_cast<float>(q.z()));
     const int found = tree_->search.radiusSearch(query, radius_m, neighbours, squared_distances, min_neighbours);
     if (found >= p.min_neighbours) {
-      verdict.blocked = true;
-      verdict.range_m = r;
-      return verdict;
+      outcome.blocked = true;
+      outcome.range_m = r;
+      return outcome;
     }
   }
-  return verdict;
+  return outcome;
 }
 
 }  // namespace urban_gnss

@@ -70,7 +70,7 @@ struct Tolerance {
   double inlier_m;
 };
 
-/// That of iteration `i`, by how far the iterations have come: wide at first, that of the verdict at the end.
+/// That of iteration `i`, by how far the iterations have come: wide at first, that of the outcome at the end.
 struct Schedule {
   const ScanAlignerParameters& parameters;
 

@@ -34,7 +34,7 @@ SatelliteVisibility assess_visibility(const RayTracer& tracer, const ObservedSpa
 
   SatelliteVisibility visibility;
   const Eigen::Vector3d centre = direction(look, antenna.east_yaw_rad);
-  const RayVerdict ahead = tracer.trace(antenna.position, centre);
+  const RayOutcome ahead = tracer.trace(antenna.position, centre);
   visibility.is_blocked_ahead = ahead.blocked;
   visibility.range_m = ahead.range_m;
   const Eigen::Vector3d sideways = Eigen::Vector3d(centre.y(), -centre.x(), 0.0).normalized();
@@ -47,12 +47,12 @@ SatelliteVisibility assess_visibility(const RayTracer& tracer, const ObservedSpa
       const LookAngles ray{look.azimuth_rad + a * azimuth_sigma,
                            std::clamp(look.elevation_rad + e * rounding_sigma, 0.0, 0.5 * kPi)};
       const Eigen::Vector3d towards = direction(ray, antenna.east_yaw_rad);
-      const RayVerdict verdict = tracer.trace(origin, towards);
+      const RayOutcome outcome = tracer.trace(origin, towards);
       const double share =
-          verdict.blocked ? 1.0 : std::min(1.0, verdict.vegetation_m / sampling.parameters.permeable_loss);
+          outcome.blocked ? 1.0 : std::min(1.0, outcome.vegetation_m / sampling.parameters.permeable_loss);
       blocked += share;
       // What blocks has been seen. A free way is known as far as it has been looked at.
-      known += verdict.blocked ? 1.0 : observed.known_fraction(origin, towards, sampling.parameters.known_range);
+      known += outcome.blocked ? 1.0 : observed.known_fraction(origin, towards, sampling.parameters.known_range);
     }
   }
   const double rays = static_cast<double>(sampling.across.size() * sampling.upwards.size());

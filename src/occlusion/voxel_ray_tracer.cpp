@@ -172,11 +172,11 @@ VoxelRayTracer::VoxelRayTracer(const VoxelMap& map, const VoxelRayTracerParamete
   require_usable("voxel ray tracer", parameters);
 }
 
-RayVerdict VoxelRayTracer::trace(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const {
-  RayVerdict verdict;
-  if (map_->size() == 0 || !origin.allFinite() || !direction.allFinite()) return verdict;
+RayOutcome VoxelRayTracer::trace(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const {
+  RayOutcome outcome;
+  if (map_->size() == 0 || !origin.allFinite() || !direction.allFinite()) return outcome;
   const Stretch inside = stretch_through(*map_, origin, direction, parameters_);
-  if (inside.begin_m > inside.end_m) return verdict;
+  if (inside.begin_m > inside.end_m) return outcome;
 
   const RayFrame frame(origin, direction);
   const auto link_m = static_cast<float>(link_m_);
@@ -206,12 +206,12 @@ RayVerdict VoxelRayTracer::trace(const Eigen::Vector3d& origin, const Eigen::Vec
     const VoxelCoordinates low = voxel_of((a.cwiseMin(b).array() - reach_m).matrix(), inverse_voxel);
     const VoxelCoordinates high = voxel_of((a.cwiseMax(b).array() + reach_m).matrix(), inverse_voxel);
     map_->for_each_nearby_voxel(center, cell, low, high, gather);
-    if (solid.is_surrounded() && solid.pierced(link_m, verdict.range_m)) {
-      verdict.blocked = true;
+    if (solid.is_surrounded() && solid.pierced(link_m, outcome.range_m)) {
+      outcome.blocked = true;
       return false;
     }
     double unused_m = 0.0;
-    if (permeable.is_surrounded() && permeable.pierced(link_m, unused_m)) verdict.vegetation_m += to_m - from_m;
+    if (permeable.is_surrounded() && permeable.pierced(link_m, unused_m)) outcome.vegetation_m += to_m - from_m;
     return true;
   };
 
@@ -225,10 +225,10 @@ RayVerdict VoxelRayTracer::trace(const Eigen::Vector3d& origin, const Eigen::Vec
                   const VoxelMap::Index found = map_->find_cell(brick, cell);
                   return found == VoxelMap::kNone || visit(found, cell, from_m, to_m);
                 });
-    return !verdict.blocked;
+    return !outcome.blocked;
   };
   walk_voxels(origin, direction, inside.begin_m, inside.end_m, map_->brick_edge_m(), visit_brick);
-  return verdict;
+  return outcome;
 }
 
 }  // namespace urban_gnss

@@ -60,14 +60,14 @@ void BiasPipeline::add_fix(const RawFix& fix) {
   // A receiver that does not know where it is may not know the time either. What is not new, the validation rejects.
   if (is_usable_position(fix)) is_new(InputStream::kFixes, fix.stamp);
   fixes_.add(fix);
-  for (const FixVerdict& rejected : fixes_.validate(*frame_)) pass_on(rejected);
+  for (const FixOutcome& rejected : fixes_.validate(*frame_)) pass_on(rejected);
   process_fixes();
 }
 
-void BiasPipeline::pass_on(const FixVerdict& verdict) {
+void BiasPipeline::pass_on(const FixOutcome& outcome) {
   BiasEstimate unchanged = tracker_.estimate();
-  unchanged.stamp = verdict.stamp;
-  unchanged.verdict = verdict;
+  unchanged.stamp = outcome.stamp;
+  unchanged.outcome = outcome;
   estimates_.push_back(std::move(unchanged));
 }
 
@@ -101,12 +101,12 @@ bool BiasPipeline::process_next_fix() {
 
   ValidatedFix fix = fixes_.pop();
   if (pose) {
-    estimates_.push_back(tracker_.process(fix.fix, transform_point(*pose, antenna_), fix.verdict));
+    estimates_.push_back(tracker_.process(fix.fix, transform_point(*pose, antenna_), fix.outcome));
     return true;
   }
-  fix.verdict.decision = FixDecision::kNotExamined;
-  fix.verdict.reason = "no estimate at its stamp";
-  pass_on(fix.verdict);
+  fix.outcome.decision = FixDecision::kNotExamined;
+  fix.outcome.reason = "no estimate at its stamp";
+  pass_on(fix.outcome);
   return true;
 }
 

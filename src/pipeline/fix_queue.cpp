@@ -8,12 +8,12 @@ namespace urban_gnss {
 
 void FixQueue::add(const RawFix& fix) { push_bounded(raw_, fix); }
 
-std::vector<FixVerdict> FixQueue::validate(const LocalFrame& frame) {
-  std::vector<FixVerdict> rejected;
+std::vector<FixOutcome> FixQueue::validate(const LocalFrame& frame) {
+  std::vector<FixOutcome> rejected;
   for (const RawFix& raw : std::exchange(raw_, {})) {
     ValidatedFix fix = validate_fix(raw, frame, last_stamp_, parameters_);
-    if (is_rejected(fix.verdict.decision)) {
-      rejected.push_back(std::move(fix.verdict));
+    if (is_rejected(fix.outcome.decision)) {
+      rejected.push_back(std::move(fix.outcome));
       continue;
     }
     last_stamp_ = raw.stamp;

@@ -144,14 +144,14 @@ std::optional<BiasQuery> LocalizationPipeline::bias_query() const {
   if (!initialized() || !localizer_->wants_bias() || next == nullptr || history_.empty()) return std::nullopt;
   const auto predicted = predicted_antenna(next->fix.stamp);
   if (!predicted) return std::nullopt;
-  return BiasQuery{next->fix, next->verdict, *predicted};
+  return BiasQuery{next->fix, next->outcome, *predicted};
 }
 
 void LocalizationPipeline::add_fix(const RawFix& fix) {
   if (is_far_ahead(fix.stamp)) {
-    FixVerdict verdict;
-    verdict.stamp = fix.stamp;
-    decide_stale(std::move(verdict), "more than " + seconds_text(kMaxAhead_s) + " ahead of the odometry");
+    FixOutcome outcome;
+    outcome.stamp = fix.stamp;
+    decide_stale(std::move(outcome), "more than " + seconds_text(kMaxAhead_s) + " ahead of the odometry");
     return;
   }
   // A receiver that does not know where it is may not know the time either. What is not new, the validation rejects.
@@ -166,7 +166,7 @@ void LocalizationPipeline::add_fix(const RawFix& fix) {
 
 void LocalizationPipeline::process_fixes() {
   if (!frame()) return;
-  for (FixVerdict& rejected : fixes_.validate(*frame())) decide(std::move(rejected));
+  for (FixOutcome& rejected : fixes_.validate(*frame())) decide(std::move(rejected));
   while (process_next_fix()) {
   }
 }
@@ -179,7 +179,7 @@ bool LocalizationPipeline::process_next_fix() {
 
   const ValidatedFix fix = fixes_.pop();
   if (is_too_old) {
-    decide_stale(fix.verdict, "older than the odometry that is remembered");
+    decide_stale(fix.outcome, "older than the odometry that is remembered");
     return true;
   }
   if (!initialized()) {
@@ -188,8 +188,8 @@ bool LocalizationPipeline::process_next_fix() {
   }
   const std::optional<BiasEstimate> bias = take_bias(fix.fix.stamp);
   if (restart_with(fix)) return true;
-  if (bias && is_rejected(bias->verdict.decision)) {
-    decide(bias->verdict);
+  if (bias && is_rejected(bias->outcome.decision)) {
+    decide(bias->outcome);
   } else {
     correct_with(fix);
   }
@@ -238,32 +238,32 @@ void LocalizationPipeline::correct_with(const ValidatedFix& fix) {
   measurement.stamp = stamp;
   if (const SatelliteEpoch* epoch = satellites_.take(stamp)) measurement.satellites = epoch->satellites;
 
-  FixVerdict verdict = localizer_->correct(measurement);
-  verdict.stamp = stamp;
-  verdict.covariance_clamped = fix.verdict.covariance_clamped;
-  if (verdict.decision == FixDecision::kAccepted) verdict.decision = fix.verdict.decision;
-  if (verdict.reason.empty()) verdict.reason = fix.verdict.reason;
-  decide(std::move(verdict));
+  FixOutcome outcome = localizer_->correct(measurement);
+  outcome.stamp = stamp;
+  outcome.covariance_clamped = fix.outcome.covariance_clamped;
+  if (outcome.decision == FixDecision::kAccepted) outcome.decision = fix.outcome.decision;
+  if (outcome.reason.empty()) outcome.reason = fix.outcome.reason;
+  decide(std::move(outcome));
   guard_against_non_finite();
 }
 
-void LocalizationPipeline::decide_stale(FixVerdict verdict, const std::string& reason) {
-  verdict.decision = FixDecision::kRejectedStale;
-  verdict.reason = reason;
-  decide(std::move(verdict));
+void LocalizationPipeline::decide_stale(FixOutcome outcome, const std::string& reason) {
+  outcome.decision = FixDecision::kRejectedStale;
+  outcome.reason = reason;
+  decide(std::move(outcome));
 }
 
 void LocalizationPipeline::decide_unexamined(const ValidatedFix& fix, const std::string& reason, bool is_start) {
-  FixVerdict verdict = fix.verdict;
-  verdict.decision = FixDecision::kNotExamined;
-  verdict.reason = reason;
-  reporter_.note_start_fix(verdict, is_start);
-  verdicts_.push_back(std::move(verdict));
+  FixOutcome outcome = fix.outcome;
+  outcome.decision = FixDecision::kNotExamined;
+  outcome.reason = reason;
+  reporter_.note_start_fix(outcome, is_start);
+  outcomes_.push_back(std::move(outcome));
 }
 
-void LocalizationPipeline::decide(FixVerdict verdict) {
-  reporter_.count(verdict);
-  verdicts_.push_back(std::move(verdict));
+void LocalizationPipeline::decide(FixOutcome outcome) {
+  reporter_.count(outcome);
+  outcomes_.push_back(std::move(outcome));
 }
 
 void LocalizationPipeline::set_pose(const PoseEstimate& pose) {
@@ -326,7 +326,7 @@ std::string LocalizationPipeline::waiting_for() const {
 }
 
 std::vector<LocalizationOutput> LocalizationPipeline::take_outputs() { return std::exchange(outputs_, {}); }
-std::vector<FixVerdict> LocalizationPipeline::take_verdicts() { return std::exchange(verdicts_, {}); }
+std::vector<FixOutcome> LocalizationPipeline::take_outcomes() { return std::exchange(outcomes_, {}); }
 std::vector<PipelineEvent> LocalizationPipeline::take_events() { return std::exchange(events_, {}); }
 
 }  // namespace urban_gnss

@@ -39,20 +39,20 @@ const char* to_string(LocalizationState state) {
   return "?";
 }
 
-void StatusReporter::count(const FixVerdict& verdict) {
-  counts_.last_fix = verdict;
-  if (is_rejected(verdict.decision)) {
+void StatusReporter::count(const FixOutcome& outcome) {
+  counts_.last_fix = outcome;
+  if (is_rejected(outcome.decision)) {
     ++counts_.fixes_rejected;
     return;
   }
   ++counts_.fixes_used;
-  if (verdict.of_ranges) ++counts_.fixes_with_ranges;
-  last_used_ = verdict.stamp;
+  if (outcome.of_ranges) ++counts_.fixes_with_ranges;
+  last_used_ = outcome.stamp;
 }
 
-void StatusReporter::note_start_fix(const FixVerdict& verdict, bool is_start) {
-  counts_.last_fix = verdict;
-  if (is_start) last_used_ = verdict.stamp;
+void StatusReporter::note_start_fix(const FixOutcome& outcome, bool is_start) {
+  counts_.last_fix = outcome;
+  if (is_start) last_used_ = outcome.stamp;
 }
 
 LocalizationReport StatusReporter::report(const PipelineStatus& status, const Localizer& localizer) const {

@@ -194,28 +194,28 @@ geometry_msgs::TransformStamped to_map_to_odom(const LocalizationOutput& output,
   return to_transform(map_to_odometry(output), to_ros(output.stamp + from_seconds(offset_s)), frames.map, frames.odom);
 }
 
-msgs::FixDecision to_message(const FixVerdict& verdict) {
+msgs::FixDecision to_message(const FixOutcome& outcome) {
   msgs::FixDecision message;
-  message.stamp = to_ros(verdict.stamp);
-  message.decision = static_cast<std::uint8_t>(verdict.decision);
-  message.nis = verdict.nis;
-  message.nis_threshold = verdict.nis_threshold;
-  message.nis_dof = static_cast<std::uint8_t>(verdict.nis_dof);
-  message.covariance_clamped = verdict.covariance_clamped;
-  message.reason = verdict.reason;
+  message.stamp = to_ros(outcome.stamp);
+  message.decision = static_cast<std::uint8_t>(outcome.decision);
+  message.nis = outcome.nis;
+  message.nis_threshold = outcome.nis_threshold;
+  message.nis_dof = static_cast<std::uint8_t>(outcome.nis_dof);
+  message.covariance_clamped = outcome.covariance_clamped;
+  message.reason = outcome.reason;
   return message;
 }
 
-FixVerdict to_verdict(const msgs::FixDecision& message) {
-  FixVerdict verdict;
-  verdict.stamp = to_stamp(message.stamp);
-  verdict.decision = static_cast<FixDecision>(message.decision);
-  verdict.nis = message.nis;
-  verdict.nis_threshold = message.nis_threshold;
-  verdict.nis_dof = message.nis_dof;
-  verdict.covariance_clamped = message.covariance_clamped;
-  verdict.reason = message.reason;
-  return verdict;
+FixOutcome to_outcome(const msgs::FixDecision& message) {
+  FixOutcome outcome;
+  outcome.stamp = to_stamp(message.stamp);
+  outcome.decision = static_cast<FixDecision>(message.decision);
+  outcome.nis = message.nis;
+  outcome.nis_threshold = message.nis_threshold;
+  outcome.nis_dof = message.nis_dof;
+  outcome.covariance_clamped = message.covariance_clamped;
+  outcome.reason = message.reason;
+  return outcome;
 }
 
 msgs::GpsBias to_message(const BiasEstimate& bias, const std::string& map_frame) {
@@ -235,7 +235,7 @@ msgs::GpsBias to_message(const BiasEstimate& bias, const std::string& map_frame)
   message.in_shadow = bias.in_shadow;
   message.shadow_statistic = bias.shadow_statistic;
   message.shadow_threshold = bias.shadow_threshold;
-  message.fix = to_message(bias.verdict);
+  message.fix = to_message(bias.outcome);
   return message;
 }
 
@@ -249,7 +249,7 @@ BiasEstimate to_bias_estimate(const msgs::GpsBias& message) {
   bias.in_shadow = message.in_shadow;
   bias.shadow_statistic = message.shadow_statistic;
   bias.shadow_threshold = message.shadow_threshold;
-  bias.verdict = to_verdict(message.fix);
+  bias.outcome = to_outcome(message.fix);
   return bias;
 }
 
@@ -283,12 +283,12 @@ msgs::LocalizationStatus to_message(const LocalizationReport& report, const Loca
 }
 
 std::vector<msgs::LocalizationStatus> to_status_messages(const LocalizationPipeline& pipeline,
-                                                         const std::vector<FixVerdict>& verdicts, const ros::Time& time,
+                                                         const std::vector<FixOutcome>& outcomes, const ros::Time& time,
                                                          const std::string& map_frame) {
   std::vector<msgs::LocalizationStatus> messages;
-  if (verdicts.empty()) return messages;
-  messages.assign(verdicts.size(), to_message(pipeline.report(), pipeline.localizer(), time, map_frame));
-  for (std::size_t i = 0; i < verdicts.size(); ++i) messages[i].last_fix = to_message(verdicts[i]);
+  if (outcomes.empty()) return messages;
+  messages.assign(outcomes.size(), to_message(pipeline.report(), pipeline.localizer(), time, map_frame));
+  for (std::size_t i = 0; i < outcomes.size(); ++i) messages[i].last_fix = to_message(outcomes[i]);
   return messages;
 }
 

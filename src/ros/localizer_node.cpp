@@ -208,13 +208,13 @@ void LocalizerNode::publish_results() {
     }
     if (on_output_) on_output_(output);
   }
-  const std::vector<FixVerdict> verdicts = pipeline_.take_verdicts();
-  for (const FixVerdict& verdict : verdicts) {
-    if (is_rejected(verdict.decision)) {
-      ROS_WARN_STREAM_THROTTLE(5.0, "fix " << to_string(verdict.decision) << ": " << verdict.reason);
+  const std::vector<FixOutcome> outcomes = pipeline_.take_outcomes();
+  for (const FixOutcome& outcome : outcomes) {
+    if (is_rejected(outcome.decision)) {
+      ROS_WARN_STREAM_THROTTLE(5.0, "fix " << to_string(outcome.decision) << ": " << outcome.reason);
     }
   }
-  for (const auto& status : to_status_messages(pipeline_, verdicts, to_ros(newest_input_), parameters_.frames.map)) {
+  for (const auto& status : to_status_messages(pipeline_, outcomes, to_ros(newest_input_), parameters_.frames.map)) {
     status_publisher_.publish(status);
   }
 }

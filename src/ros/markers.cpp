@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "urban_gnss_localization/ros/marker_parts.hpp"
 #include "urban_gnss_localization/ros/conversions.hpp"
+#include "urban_gnss_localization/ros/marker_parts.hpp"
 
 namespace urban_gnss {
 namespace {
@@ -32,7 +32,7 @@ visualization_msgs::MarkerArray bias_markers(const BiasEstimate& bias, const std
   arrow.points = {point(centre.x(), centre.y(), kHeight_m),
                   point(centre.x() + bias.bias.x(), centre.y() + bias.bias.y(), kHeight_m)};
   const Colour fix_colour =
-      is_rejected(bias.verdict.decision) ? Colour{0.9F, 0.1F, 0.1F, 1.0F} : Colour{1.0F, 0.95F, 0.1F, 1.0F};
+      is_rejected(bias.outcome.decision) ? Colour{0.9F, 0.1F, 0.1F, 1.0F} : Colour{1.0F, 0.95F, 0.1F, 1.0F};
   Marker fix = make_marker("fix", 0, Marker::SPHERE, fix_colour, time, map_frame);
   fix.pose.position = point(bias.fix_position.x(), bias.fix_position.y(), kHeight_m);
   set_scale(fix, size, size, size);

@@ -36,7 +36,7 @@ OcclusionNode::OcclusionNode(ros::NodeHandle& node, ros::NodeHandle& private_nod
   if (!parameters_.prior_map.empty()) prior_ = read_pcd(parameters_.prior_map);
   pipeline_ = std::make_unique<OcclusionPipeline>(settings.pipeline);
   fix_stamps_ = StampMonitor(parameters_.time_jump);
-  antenna_known_ = pipeline.occlusion.antenna_offset != std::vector<double>{0.0, 0.0, 0.0};
+  antenna_known_ = settings.pipeline.occlusion.antenna_offset != std::vector<double>{0.0, 0.0, 0.0};
 
   fix_publisher_ = node.advertise<sensor_msgs::NavSatFix>(topics::kWeightedFix, 100);
   visibility_publisher_ = node.advertise<urban_gnss_localization::Visibility>(topics::kVisibility, 100);

@@ -175,7 +175,7 @@ msgs::Visibility to_message(const FixAssessment& assessment, const std::optional
   message.weighted_covariance = row_major(covariance.weighted);
   for (std::size_t i = 0; i < assessment.satellites.size(); ++i) {
     const SatelliteObservation& satellite = assessment.satellites[i];
-    const SatelliteAssessment& verdict = covariance.satellites[i];
+    const SatelliteAssessment& outcome = covariance.satellites[i];
     msgs::SatelliteVisibility visibility;
     visibility.constellation = static_cast<std::uint8_t>(satellite.id.constellation);
     visibility.svid = static_cast<std::uint16_t>(satellite.id.svid);
@@ -185,9 +185,9 @@ msgs::Visibility to_message(const FixAssessment& assessment, const std::optional
     visibility.cn0 = static_cast<float>(satellite.cn0_dbhz);
     visibility.blocked_fraction = static_cast<float>(satellite.blocked_fraction);
     visibility.known_fraction = static_cast<float>(satellite.known_fraction);
-    visibility.nlos_probability = static_cast<float>(verdict.nlos_probability);
+    visibility.nlos_probability = static_cast<float>(outcome.nlos_probability);
     visibility.range = static_cast<float>(assessment.has_map ? assessment.visibilities[i].range_m : kNaN);
-    visibility.visibility = visibility_class(verdict, satellite, assessment.has_map);
+    visibility.visibility = visibility_class(outcome, satellite, assessment.has_map);
     message.satellites.push_back(visibility);
   }
   return message;

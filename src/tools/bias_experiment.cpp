@@ -65,7 +65,7 @@ nlohmann::json contestant_json(const std::vector<BiasRun>& runs, std::size_t con
     }
     bool was_doubted = false;
     for (const BiasEstimate& bias : of_run.biases) {
-      const FixDecision decision = bias.verdict.decision;
+      const FixDecision decision = bias.outcome.decision;
       if (decision == FixDecision::kNotExamined) continue;
       const std::size_t phase = phase_of(run, bias.stamp);
       const bool is_doubted = decision == FixDecision::kBiasCompensated || is_rejected(decision);
@@ -173,7 +173,7 @@ void write_series(const fs::path& directory, const BiasRun& run) {
     write_file(directory / ("bias_" + name + ".csv"), [&](std::ostream& out) {
       out << "t,bias_x,bias_y,sigma_x,sigma_y,significant,doubted\n" << std::setprecision(9);
       for (const BiasEstimate& bias : contestant.biases) {
-        const FixDecision decision = bias.verdict.decision;
+        const FixDecision decision = bias.outcome.decision;
         out << seconds(bias.stamp) << ',' << bias.bias.x() << ',' << bias.bias.y() << ','
             << std::sqrt(bias.covariance(0, 0)) << ',' << std::sqrt(bias.covariance(1, 1)) << ',' << bias.in_shadow
             << ',' << (decision == FixDecision::kBiasCompensated || is_rejected(decision)) << '\n';
@@ -184,7 +184,8 @@ void write_series(const fs::path& directory, const BiasRun& run) {
 
 void run_all(const Options& options, const std::string& command) {
   BiasExperimentConditions conditions;
-  read_overrides("--set", YAML::Node(YAML::NodeType::Map), options.overrides, conditions.filter, conditions.localization);
+  read_overrides("--set", YAML::Node(YAML::NodeType::Map), options.overrides, conditions.filter,
+                 conditions.localization);
   const auto seeds = static_cast<std::size_t>(options.seeds);
   std::vector<std::vector<BiasRun>> results(options.scenarios.size(), std::vector<BiasRun>(seeds));
   const auto start = std::chrono::steady_clock::now();
@@ -225,7 +226,8 @@ void run_all(const Options& options, const std::string& command) {
 
 int main(int argc, char** argv) {
   Options options;
-  CommandLine line("bias_experiment", "Figure 6 of Kim et al. on simulated scenarios: every filter on the same measurements.");
+  CommandLine line("bias_experiment",
+                   "Figure 6 of Kim et al. on simulated scenarios: every filter on the same measurements.");
   line.add_scenarios(options.scenarios, options.scenario_overrides);
   line.add_seeds(options.seeds, options.first_seed);
   line.add_set("--set", options.overrides, "a parameter of complementary_ekf or localization");

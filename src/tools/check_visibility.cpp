@@ -1,4 +1,4 @@
-// Compares the verdicts of a ray tracer over a point cloud with those of a table: an exact cast at the polygons of the
+// Compares the outcomes of a ray tracer over a point cloud with those of a table: an exact cast at the polygons of the
 // buildings, and published labels.
 
 #include <chrono>
@@ -90,15 +90,15 @@ std::vector<Row> read_rows(const std::string& path) {
   return rows;
 }
 
-/// Verdicts counted against what should have been said; "blocked" is the positive.
+/// Outcomes counted against what should have been said; "blocked" is the positive.
 struct Confusion {
   std::size_t blocked_as_blocked{0};
   std::size_t blocked_as_free{0};
   std::size_t free_as_blocked{0};
   std::size_t free_as_free{0};
 
-  void add(bool truth, bool verdict) {
-    ++(truth ? (verdict ? blocked_as_blocked : blocked_as_free) : (verdict ? free_as_blocked : free_as_free));
+  void add(bool truth, bool outcome) {
+    ++(truth ? (outcome ? blocked_as_blocked : blocked_as_free) : (outcome ? free_as_blocked : free_as_free));
   }
   std::size_t total() const { return blocked_as_blocked + blocked_as_free + free_as_blocked + free_as_free; }
   /// null where nothing was counted
@@ -115,16 +115,16 @@ struct Confusion {
 };
 
 struct Result {
-  std::vector<bool> verdicts;
+  std::vector<bool> outcomes;
   double us_per_ray{0.0};
 };
 
 Result trace_all(const RayTracer& tracer, const std::vector<Row>& rows) {
   Result result;
-  result.verdicts.reserve(rows.size());
+  result.outcomes.reserve(rows.size());
   const auto begin = std::chrono::steady_clock::now();
   for (const Row& row : rows) {
-    result.verdicts.push_back(tracer.trace(row.antenna, urban_gnss::line_of_sight(row.look)).blocked);
+    result.outcomes.push_back(tracer.trace(row.antenna, urban_gnss::line_of_sight(row.look)).blocked);
   }
   const std::chrono::duration<double, std::micro> elapsed = std::chrono::steady_clock::now() - begin;
   result.us_per_ray = elapsed.count() / static_cast<double>(rows.size());
@@ -137,9 +137,9 @@ nlohmann::json score(const Result& result, const std::vector<Row>& rows, double 
   Confusion labelled;
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const Row& row = rows[i];
-    all.add(row.blocked, result.verdicts[i]);
-    if (std::abs(row.look.elevation_rad - row.mask_rad) > edge_rad) off_edge.add(row.blocked, result.verdicts[i]);
-    if (row.label) labelled.add(*row.label, result.verdicts[i]);
+    all.add(row.blocked, result.outcomes[i]);
+    if (std::abs(row.look.elevation_rad - row.mask_rad) > edge_rad) off_edge.add(row.blocked, result.outcomes[i]);
+    if (row.label) labelled.add(*row.label, result.outcomes[i]);
   }
   return {{"rows", all.total()},
           {"agreement", all.agreement()},
@@ -201,8 +201,8 @@ void check_visibility(const Options& options) {
   for (const auto& [name, tracer] : tracers) {
     const Result result = trace_all(*tracer, rows);
     nlohmann::json scores = score(result, rows, urban_gnss::degrees_to_radians(options.edge_deg));
-    if (name == "voxel") of_voxel = result.verdicts;
-    if (!of_voxel.empty()) scores["agreement_with_voxel"] = share_equal(result.verdicts, of_voxel);
+    if (name == "voxel") of_voxel = result.outcomes;
+    if (!of_voxel.empty()) scores["agreement_with_voxel"] = share_equal(result.outcomes, of_voxel);
     if (name == options.tracer) report = scores;
     std::cout << std::left << std::setw(18) << name << std::right << std::setw(9) << std::setprecision(4)
               << scores["agreement"].get<double>() << std::setw(10);
@@ -227,7 +227,8 @@ void check_visibility(const Options& options) {
 
 int main(int argc, char** argv) {
   Options options;
-  CommandLine line("check_visibility", "Compares a ray tracer's verdicts over a point cloud with a table of exact ones.");
+  urban_gnss::CommandLine line("check_visibility",
+                   "Compares a ray tracer's outcomes over a point cloud with a table of exact ones.");
   CLI::App& app = line.app();
   app.add_option("--map", options.map, "point cloud of the surroundings (.pcd)")->required()->check(CLI::ExistingFile);
   app.add_option(

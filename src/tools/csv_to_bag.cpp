@@ -342,7 +342,7 @@ int main(int argc, char** argv) {
   std::string output;
   std::string gnss_file = "gnss.csv";
   OdometryNoise noise;
-  CommandLine line("csv_to_bag", "Makes a bag out of a folder of recorded CSV files.");
+  urban_gnss::CommandLine line("csv_to_bag", "Makes a bag out of a folder of recorded CSV files.");
   line.app()
       .add_option("DIR", folder,
                   "folder with meta.json, odom.csv and the fixes; sats.csv, gnss_vel.csv, imu.csv and truth.csv are used "

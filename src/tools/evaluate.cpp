@@ -318,7 +318,7 @@ void evaluate(const Options& options) {
 int main(int argc, char** argv) {
   Options options;
   bool no_plots = false;
-  CommandLine line("evaluate", "Scores estimates and raw fixes in bags against ground truth.");
+  urban_gnss::CommandLine line("evaluate", "Scores estimates and raw fixes in bags against ground truth.");
   CLI::App& app = line.app();
   app.add_option("BAG", options.bags, "bags to evaluate")->required()->check(CLI::ExistingFile);
   app.add_option("--output", options.output, "folder for metrics.json, data/, trajectories and plots")->required();

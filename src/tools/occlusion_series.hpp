@@ -24,7 +24,7 @@ inline void write_trajectory(const std::filesystem::path& path, const Trajectory
 }
 
 /// What figures 5 to 7 of Maier and Kleiner 2010 show of one run: DIRECTORY/fixes_<scenario>.csv with the fixes, their
-/// errors and each model's sigma_p (m) and verdict, and trajectory_<scenario>_<name>.csv. Throws what write_file
+/// errors and each model's sigma_p (m) and outcome, and trajectory_<scenario>_<name>.csv. Throws what write_file
 /// throws.
 inline void write_series(const std::filesystem::path& directory, const std::string& scenario, const OcclusionRun& run) {
   if (run.truth.empty()) return;

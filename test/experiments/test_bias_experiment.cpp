@@ -72,7 +72,7 @@ TEST(BiasExperiment, EveryFilterGetsTheSameDrive) {
     ASSERT_FALSE(contestant.estimate.empty());
     EXPECT_LT(mean_error_m(run, i), 10.0) << kBiasContestants[i].name;
     for (const BiasEstimate& bias : contestant.biases) {
-      const FixDecision decision = bias.verdict.decision;
+      const FixDecision decision = bias.outcome.decision;
       if (kBiasContestants[i].mode != ComplementaryMode::kCompensated) {
         EXPECT_EQ(bias.bias.norm(), 0.0);
       }

@@ -46,7 +46,7 @@ FixDecision decision_at(double latitude, double longitude) {
   RawFix raw = good_fix();
   raw.position.latitude_deg = latitude;
   raw.position.longitude_deg = longitude;
-  return validate(raw).verdict.decision;
+  return validate(raw).outcome.decision;
 }
 
 Eigen::Matrix2d isotropic(double sigma) { return sigma * sigma * Eigen::Matrix2d::Identity(); }
@@ -56,10 +56,10 @@ bool is_near(const Eigen::Matrix2d& a, const Eigen::Matrix2d& b) { return a.isAp
 TEST(FixValidation, GoodFixIsAcceptedAsDeclared) {
   const RawFix raw = good_fix();
   const ValidatedFix result = validate(raw);
-  EXPECT_EQ(result.verdict.decision, FixDecision::kAccepted) << result.verdict.reason;
-  EXPECT_FALSE(result.verdict.covariance_clamped);
-  EXPECT_EQ(result.verdict.reason, "");
-  EXPECT_EQ(result.verdict.stamp, raw.stamp);
+  EXPECT_EQ(result.outcome.decision, FixDecision::kAccepted) << result.outcome.reason;
+  EXPECT_FALSE(result.outcome.covariance_clamped);
+  EXPECT_EQ(result.outcome.reason, "");
+  EXPECT_EQ(result.outcome.stamp, raw.stamp);
   EXPECT_EQ(result.fix.stamp, raw.stamp);
   EXPECT_TRUE(is_near(result.fix.covariance, Eigen::Vector2d(4.0, 9.0).asDiagonal()));
   EXPECT_EQ(result.fix.position, LocalFrame(kDatum).to_local(raw.position).head<2>());
@@ -70,7 +70,7 @@ TEST(FixValidation, NoFixIsRejectedByStatusBeforeAnythingElse) {
   RawFix raw = good_fix();
   raw.has_fix = false;
   raw.position.latitude_deg = kNaN;
-  EXPECT_EQ(validate(raw).verdict.decision, FixDecision::kRejectedStatus);
+  EXPECT_EQ(validate(raw).outcome.decision, FixDecision::kRejectedStatus);
   EXPECT_FALSE(is_usable_position(raw));
 }
 
@@ -89,7 +89,7 @@ TEST(FixValidation, NoSuchPlaceIsRejected) {
   RawFix raw = good_fix();
   raw.position.longitude_deg -= 360.0;  // the same meridian, but no receiver says it so
   EXPECT_FALSE(is_usable_position(raw));
-  EXPECT_EQ(validate(raw).verdict.decision, FixDecision::kRejectedOutOfRange);
+  EXPECT_EQ(validate(raw).outcome.decision, FixDecision::kRejectedOutOfRange);
 }
 
 TEST(FixValidation, LatitudeAndLongitudeBothZeroAreRejected) {
@@ -98,9 +98,9 @@ TEST(FixValidation, LatitudeAndLongitudeBothZeroAreRejected) {
   raw.position = {0.0, -0.0, 10.0};
   const LocalFrame gulf_of_guinea({0.0001, 0.0001, 0.0});  // the distance from the datum is not what rejects it
   const auto result = validate_fix(raw, gulf_of_guinea, std::nullopt, parameters);
-  EXPECT_EQ(result.verdict.decision, FixDecision::kRejectedOutOfRange);
+  EXPECT_EQ(result.outcome.decision, FixDecision::kRejectedOutOfRange);
   raw.position.longitude_deg = 1e-5;
-  EXPECT_EQ(validate_fix(raw, gulf_of_guinea, std::nullopt, parameters).verdict.decision, FixDecision::kAccepted);
+  EXPECT_EQ(validate_fix(raw, gulf_of_guinea, std::nullopt, parameters).outcome.decision, FixDecision::kAccepted);
 }
 
 TEST(FixValidation, LongitudeOf180IsAPlace) {
@@ -108,7 +108,7 @@ TEST(FixValidation, LongitudeOf180IsAPlace) {
   for (const double longitude : {180.0, -180.0}) {
     raw.position = {-16.8, longitude, 0.0};
     const auto result = validate_fix(raw, LocalFrame({-16.8, 179.9999, 0.0}), std::nullopt, {});
-    EXPECT_EQ(result.verdict.decision, FixDecision::kAccepted) << result.verdict.reason;
+    EXPECT_EQ(result.outcome.decision, FixDecision::kAccepted) << result.outcome.reason;
     EXPECT_NEAR(result.fix.position.x(), 10.66, 0.01);
   }
 }
@@ -118,9 +118,9 @@ TEST(FixValidation, FarFromTheDatumIsRejectedEvenAtTheAntipode) {
   parameters.max_distance_from_datum = 1000.0;
   RawFix raw = good_fix();
   raw.position.latitude_deg = kDatum.latitude_deg + 0.008;  // 887 m
-  EXPECT_EQ(validate(raw, parameters).verdict.decision, FixDecision::kAccepted);
+  EXPECT_EQ(validate(raw, parameters).outcome.decision, FixDecision::kAccepted);
   raw.position.latitude_deg = kDatum.latitude_deg + 0.010;  // 1109 m
-  EXPECT_EQ(validate(raw, parameters).verdict.decision, FixDecision::kRejectedOutOfRange);
+  EXPECT_EQ(validate(raw, parameters).outcome.decision, FixDecision::kRejectedOutOfRange);
   EXPECT_EQ(decision_at(-kDatum.latitude_deg, kDatum.longitude_deg - 180.0), FixDecision::kRejectedOutOfRange);
 }
 
@@ -129,28 +129,28 @@ TEST(FixValidation, HeightIsNoDistance) {
   parameters.max_distance_from_datum = 1000.0;
   RawFix raw = good_fix();
   raw.position.altitude_m = 2500.0;  // the datum's height was left at 30 m
-  EXPECT_EQ(validate(raw, parameters).verdict.decision, FixDecision::kAccepted);
+  EXPECT_EQ(validate(raw, parameters).outcome.decision, FixDecision::kAccepted);
 }
 
 TEST(FixValidation, NegativeStampIsRejected) {
   RawFix raw = good_fix();
   for (const Stamp stamp : {Stamp(-1), Stamp::min()}) {
     raw.stamp = stamp;
-    EXPECT_EQ(validate(raw).verdict.decision, FixDecision::kRejectedOutOfRange);
+    EXPECT_EQ(validate(raw).outcome.decision, FixDecision::kRejectedOutOfRange);
   }
   raw.stamp = Stamp(0);
-  EXPECT_EQ(validate(raw).verdict.decision, FixDecision::kAccepted);
+  EXPECT_EQ(validate(raw).outcome.decision, FixDecision::kAccepted);
 }
 
 TEST(FixValidation, StampMustBeNewerThanTheLast) {
   const RawFix raw = good_fix();
   const auto duplicate = validate(raw, {}, raw.stamp);
-  EXPECT_EQ(duplicate.verdict.decision, FixDecision::kRejectedStale);
-  EXPECT_NE(duplicate.verdict.reason.find("duplicate"), std::string::npos);
+  EXPECT_EQ(duplicate.outcome.decision, FixDecision::kRejectedStale);
+  EXPECT_NE(duplicate.outcome.reason.find("duplicate"), std::string::npos);
   const auto older = validate(raw, {}, raw.stamp + from_seconds(0.5));
-  EXPECT_EQ(older.verdict.decision, FixDecision::kRejectedStale);
-  EXPECT_EQ(older.verdict.reason, "0.5 s older than the last fix");
-  EXPECT_EQ(validate(raw, {}, raw.stamp - Stamp(1)).verdict.decision, FixDecision::kAccepted);
+  EXPECT_EQ(older.outcome.decision, FixDecision::kRejectedStale);
+  EXPECT_EQ(older.outcome.reason, "0.5 s older than the last fix");
+  EXPECT_EQ(validate(raw, {}, raw.stamp - Stamp(1)).outcome.decision, FixDecision::kAccepted);
 }
 
 TEST(FixValidation, UnusableAltitudeDoesNotDropTheFix) {
@@ -160,9 +160,9 @@ TEST(FixValidation, UnusableAltitudeDoesNotDropTheFix) {
   for (const double altitude : {kNaN, kInfinity, -kInfinity, kMax, -1e9}) {
     raw.position.altitude_m = altitude;
     const auto result = validate(raw);
-    EXPECT_EQ(result.verdict.decision, FixDecision::kAccepted);
+    EXPECT_EQ(result.outcome.decision, FixDecision::kAccepted);
     EXPECT_EQ(result.fix.position, expected);
-    EXPECT_NE(result.verdict.reason.find("altitude"), std::string::npos);
+    EXPECT_NE(result.outcome.reason.find("altitude"), std::string::npos);
   }
 }
 
@@ -174,7 +174,7 @@ TEST(FixValidation, RejectedFixHoldsNothingButTheStamp) {
   EXPECT_EQ(result.fix.stamp, raw.stamp);
   EXPECT_EQ(result.fix.position, Eigen::Vector2d::Zero());
   EXPECT_EQ(result.fix.covariance, Eigen::Matrix2d::Identity());
-  EXPECT_TRUE(is_rejected(result.verdict.decision));
+  EXPECT_TRUE(is_rejected(result.outcome.decision));
 }
 
 TEST(FixValidation, CovarianceThatCannotBeUsedIsTheDefault) {
@@ -195,9 +195,9 @@ TEST(FixValidation, CovarianceThatCannotBeUsedIsTheDefault) {
                              fix_with_covariance(1.0, 1.0, kMax)};
   for (const RawFix& raw : unusable) {
     const auto result = validate(raw, parameters);
-    EXPECT_EQ(result.verdict.decision, FixDecision::kInflated) << raw.covariance;
-    EXPECT_TRUE(result.verdict.covariance_clamped);
-    EXPECT_NE(result.verdict.reason.find("default sigma 7 m"), std::string::npos) << result.verdict.reason;
+    EXPECT_EQ(result.outcome.decision, FixDecision::kInflated) << raw.covariance;
+    EXPECT_TRUE(result.outcome.covariance_clamped);
+    EXPECT_NE(result.outcome.reason.find("default sigma 7 m"), std::string::npos) << result.outcome.reason;
     EXPECT_TRUE(is_near(result.fix.covariance, isotropic(7.0))) << result.fix.covariance;
   }
 }
@@ -206,15 +206,15 @@ TEST(FixValidation, VerticalCovarianceDoesNotMatter) {
   RawFix raw = good_fix();
   raw.covariance.row(2).setConstant(kNaN);
   raw.covariance.col(2).setConstant(kNaN);
-  EXPECT_EQ(validate(raw).verdict.decision, FixDecision::kAccepted);
+  EXPECT_EQ(validate(raw).outcome.decision, FixDecision::kAccepted);
 }
 
 TEST(FixValidation, MillimetresAndSquaredDegreesAreRaisedToTheFloor) {
   for (const double variance : {9e-6, 1e-10, 1e-300, std::numeric_limits<double>::denorm_min()}) {
     const auto result = validate(fix_with_covariance(variance, variance, 0.0));
-    EXPECT_EQ(result.verdict.decision, FixDecision::kInflated);
-    EXPECT_TRUE(result.verdict.covariance_clamped);
-    EXPECT_NE(result.verdict.reason.find("floor"), std::string::npos) << result.verdict.reason;
+    EXPECT_EQ(result.outcome.decision, FixDecision::kInflated);
+    EXPECT_TRUE(result.outcome.covariance_clamped);
+    EXPECT_NE(result.outcome.reason.find("floor"), std::string::npos) << result.outcome.reason;
     EXPECT_TRUE(is_near(result.fix.covariance, isotropic(0.3)));
   }
 }
@@ -222,9 +222,9 @@ TEST(FixValidation, MillimetresAndSquaredDegreesAreRaisedToTheFloor) {
 TEST(FixValidation, HugeVariancesAreLoweredToTheCeiling) {
   for (const double variance : {4.1e4, 1e10, 1e200, kMax}) {
     const auto result = validate(fix_with_covariance(variance, variance, 0.0));
-    EXPECT_EQ(result.verdict.decision, FixDecision::kAccepted) << result.verdict.reason;
-    EXPECT_TRUE(result.verdict.covariance_clamped);
-    EXPECT_NE(result.verdict.reason.find("ceiling"), std::string::npos) << result.verdict.reason;
+    EXPECT_EQ(result.outcome.decision, FixDecision::kAccepted) << result.outcome.reason;
+    EXPECT_TRUE(result.outcome.covariance_clamped);
+    EXPECT_NE(result.outcome.reason.find("ceiling"), std::string::npos) << result.outcome.reason;
     EXPECT_TRUE(is_near(result.fix.covariance, isotropic(200.0))) << result.fix.covariance;
   }
 }
@@ -236,7 +236,7 @@ TEST(FixValidation, AxesAreClampedEachOnItsOwn) {
     EXPECT_NEAR(covariance(1, 1), 4.0, 1e-6);
   }
   const auto both = validate(fix_with_covariance(kMax, 1e-8, 0.0));
-  EXPECT_EQ(both.verdict.decision, FixDecision::kInflated);
+  EXPECT_EQ(both.outcome.decision, FixDecision::kInflated);
   EXPECT_NEAR(both.fix.covariance(1, 1), 0.09, 1e-9);
 }
 
@@ -249,7 +249,7 @@ TEST(FixValidation, CorrelationIsKept) {
   RawFix raw = good_fix();
   raw.covariance.topLeftCorner<2, 2>() = ellipse(2.0, 20.0);
   EXPECT_TRUE(is_near(validate(raw).fix.covariance, ellipse(2.0, 20.0)));
-  EXPECT_EQ(validate(raw).verdict.decision, FixDecision::kAccepted);
+  EXPECT_EQ(validate(raw).outcome.decision, FixDecision::kAccepted);
   raw.covariance.topLeftCorner<2, 2>() = ellipse(0.1, 20.0);
   EXPECT_TRUE(is_near(validate(raw).fix.covariance, ellipse(0.3, 20.0)));
   raw.covariance.topLeftCorner<2, 2>() = ellipse(0.1, 2000.0);
@@ -343,12 +343,12 @@ TEST(FixValidation, NothingReceivedLeadsToANonFiniteResult) {
     raw.covariance_type = static_cast<CovarianceType>(trial % 4);
     const std::optional<Stamp> last = trial % 3 == 0 ? std::optional<Stamp>(pick(stamps)) : std::nullopt;
 
-    const auto [fix, verdict] = validate_fix(raw, frame, last, parameter_sets[trial % 5 == 0]);
+    const auto [fix, outcome] = validate_fix(raw, frame, last, parameter_sets[trial % 5 == 0]);
     ASSERT_TRUE(fix.position.allFinite());
     ASSERT_TRUE(fix.covariance.allFinite());
-    ASSERT_NE(verdict.decision, FixDecision::kNotExamined);
-    if (is_rejected(verdict.decision)) {
-      ASSERT_FALSE(verdict.reason.empty());
+    ASSERT_NE(outcome.decision, FixDecision::kNotExamined);
+    if (is_rejected(outcome.decision)) {
+      ASSERT_FALSE(outcome.reason.empty());
       continue;
     }
     ++used;

@@ -205,7 +205,7 @@ TEST(ComplementaryEkf, EstimatedBiasIsPublished) {
   ASSERT_EQ(estimates.size(), 10u);
   const BiasEstimate& last = estimates.back();
   EXPECT_EQ(last.stamp, from_seconds(drive.time_s));
-  EXPECT_EQ(last.verdict.decision, FixDecision::kBiasCompensated);
+  EXPECT_EQ(last.outcome.decision, FixDecision::kBiasCompensated);
   EXPECT_TRUE(last.in_shadow);
   EXPECT_NEAR(last.radius_m, 15.0, 3.0);
   const Eigen::Vector2d error = last.bias - Eigen::Vector2d(12.0, -9.0);

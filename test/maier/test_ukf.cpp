@@ -40,10 +40,10 @@ TEST(Ukf, LinearCaseEqualsTheKalmanFilter) {
       const Eigen::Matrix2d r = (Eigen::Matrix2d() << 4.0, 1.0, 1.0, 2.0).finished();
       FixMeasurement fix = fix_at(position, 1.0, step);
       fix.covariance = r;
-      const FixVerdict verdict = ukf.correct(fix);
+      const FixOutcome outcome = ukf.correct(fix);
       const Eigen::Matrix2d s = covariance.topLeftCorner<2, 2>() + r;
       const Eigen::Vector2d innovation = position - mean.head<2>();
-      ASSERT_NEAR(verdict.nis, innovation.dot(s.inverse() * innovation), 1e-5 * (1.0 + verdict.nis));
+      ASSERT_NEAR(outcome.nis, innovation.dot(s.inverse() * innovation), 1e-5 * (1.0 + outcome.nis));
       const Eigen::Matrix<double, 3, 2> gain = covariance.leftCols<2>() * s.inverse();
       mean += gain * innovation;
       covariance -= gain * s * gain.transpose();

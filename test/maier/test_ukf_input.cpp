@@ -28,9 +28,9 @@ TEST(UkfInput, BadInputChangesNothing) {
       double* const fields[] = {&fix.position.x(),     &fix.antenna_in_body.y(), &fix.time_s,
                                 &fix.covariance(0, 0), &fix.covariance(0, 1),    &fix.covariance(1, 1)};
       *fields[field] = bad;
-      const FixVerdict verdict = ukf.correct(fix);
-      EXPECT_TRUE(is_rejected(verdict.decision)) << field;
-      EXPECT_FALSE(verdict.reason.empty());
+      const FixOutcome outcome = ukf.correct(fix);
+      EXPECT_TRUE(is_rejected(outcome.decision)) << field;
+      EXPECT_FALSE(outcome.reason.empty());
     }
   }
   ukf.move({1.0, 0.0}, 0.0);
@@ -86,11 +86,11 @@ TEST(UkfInput, OutlierDoesNotCorruptHeadingOrBias) {
   const auto shift = [](OutlierPolicy policy, FixDecision expected) {
     Ukf ukf = settled(policy);
     const Ukf::State before = ukf.state();
-    const FixVerdict verdict = ukf.correct(fix_at({60.0, 100.0}, 2.0, 61.0));
-    EXPECT_EQ(verdict.decision, expected);
-    EXPECT_GT(verdict.nis, 500.0);
-    EXPECT_NEAR(verdict.nis_threshold, 9.2103, 1e-4);
-    EXPECT_EQ(verdict.nis_dof, 2);
+    const FixOutcome outcome = ukf.correct(fix_at({60.0, 100.0}, 2.0, 61.0));
+    EXPECT_EQ(outcome.decision, expected);
+    EXPECT_GT(outcome.nis, 500.0);
+    EXPECT_NEAR(outcome.nis_threshold, 9.2103, 1e-4);
+    EXPECT_EQ(outcome.nis_dof, 2);
     return Ukf::State((ukf.state() - before).cwiseAbs());
   };
   const auto none = shift(OutlierPolicy::kNone, FixDecision::kAccepted);
@@ -105,10 +105,10 @@ TEST(UkfInput, OutlierDoesNotCorruptHeadingOrBias) {
 TEST(UkfInput, GoodFixIsAccepted) {
   for (const auto policy : {OutlierPolicy::kNone, OutlierPolicy::kStudentT, OutlierPolicy::kGate}) {
     Ukf ukf = settled(policy);
-    const FixVerdict verdict = ukf.correct(fix_at({60.5, 0.5}, 2.0, 61.0));
-    EXPECT_EQ(verdict.decision, FixDecision::kAccepted);
-    EXPECT_LT(verdict.nis, 1.0);
-    EXPECT_GT(verdict.nis, 0.0);
+    const FixOutcome outcome = ukf.correct(fix_at({60.5, 0.5}, 2.0, 61.0));
+    EXPECT_EQ(outcome.decision, FixDecision::kAccepted);
+    EXPECT_LT(outcome.nis, 1.0);
+    EXPECT_GT(outcome.nis, 0.0);
   }
 }
 
@@ -118,9 +118,9 @@ TEST(UkfInput, GateRestartsOnTheFixAfterTheTimeout) {
   for (int i = 0; i < 5; ++i) {
     EXPECT_EQ(ukf.correct(fix_at({60.0, 100.0}, 2.0, 61.0 + i)).decision, FixDecision::kRejectedGate) << i;
   }
-  const FixVerdict verdict = ukf.correct(fix_at({60.0, 100.0}, 2.0, 66.0));
-  EXPECT_EQ(verdict.decision, FixDecision::kAccepted);
-  EXPECT_NE(verdict.reason.find("restarted"), std::string::npos);
+  const FixOutcome outcome = ukf.correct(fix_at({60.0, 100.0}, 2.0, 66.0));
+  EXPECT_EQ(outcome.decision, FixDecision::kAccepted);
+  EXPECT_NE(outcome.reason.find("restarted"), std::string::npos);
   EXPECT_TRUE(near(ukf.pose(), {60.0, 100.0, yaw}, 1e-9));
   EXPECT_NEAR(ukf.health().position_spread_m, 2.0 * std::sqrt(2.0), 1e-9);
 
@@ -182,9 +182,9 @@ TEST(UkfInput, EveryParameterHasAnEffect) {
       ukf.move(i % 100 < 90 ? Twist2{2.0, 0.2} : Twist2{}, 0.1);
       const double off = i > 200 ? 60.0 : 1.0;
       if (i % 10 == 0) {
-        const FixVerdict verdict =
+        const FixOutcome outcome =
             ukf.correct(fix_at(ukf.pose().position() + off * Eigen::Vector2d(draw_normal(engine), 1.0), 2.0, 0.1 * i));
-        text << static_cast<int>(verdict.decision);
+        text << static_cast<int>(outcome.decision);
       }
     }
     text << ukf.state() << ukf.covariance();

@@ -169,7 +169,7 @@ TEST(BiasTracker, ShadowIsSetWhileTheBiasIsSignificant) {
     const Eigen::Vector2d noise(draw_normal(engine), draw_normal(engine));
     const BiasEstimate& e = tracker.process(fix_at(time, Eigen::Vector2d(0.0, bias) + noise), {0.0, 0.0});
     EXPECT_EQ(e.in_shadow, e.shadow_statistic > e.shadow_threshold);
-    EXPECT_EQ(e.verdict.decision == FixDecision::kBiasCompensated, e.in_shadow && !is_rejected(e.verdict.decision));
+    EXPECT_EQ(e.outcome.decision == FixDecision::kBiasCompensated, e.in_shadow && !is_rejected(e.outcome.decision));
     if (time < 75.0 || time > 165.0) sun_alarms += e.in_shadow;
     if (time > 90.0 && time < 140.0) shadow_misses += !e.in_shadow;
   }
@@ -189,21 +189,21 @@ TEST(BiasTracker, GateRejectsAJumpAndRecoversAfterItsTimeout) {
 
   for (int k = 21; k < 25; ++k) {
     const BiasEstimate& e = tracker.process(fix_at(k, {60.0, 0.0}), {0.0, 0.0});
-    EXPECT_EQ(e.verdict.decision, FixDecision::kRejectedGate) << k;
-    EXPECT_GT(e.verdict.nis, e.verdict.nis_threshold);
-    EXPECT_NEAR(e.verdict.nis_threshold, chi_squared_quantile(0.99, 2), 1e-12);
-    EXPECT_EQ(e.verdict.nis_dof, 2);
+    EXPECT_EQ(e.outcome.decision, FixDecision::kRejectedGate) << k;
+    EXPECT_GT(e.outcome.nis, e.outcome.nis_threshold);
+    EXPECT_NEAR(e.outcome.nis_threshold, chi_squared_quantile(0.99, 2), 1e-12);
+    EXPECT_EQ(e.outcome.nis_dof, 2);
     EXPECT_EQ(e.stamp, from_seconds(k));
     EXPECT_EQ(e.bias, before.bias);
     EXPECT_EQ(e.covariance, before.covariance);
     EXPECT_EQ(e.in_shadow, before.in_shadow);
   }
   const BiasEstimate& recovered = tracker.process(fix_at(25, {60.0, 0.0}), {0.0, 0.0});
-  EXPECT_EQ(recovered.verdict.decision, FixDecision::kBiasCompensated);
+  EXPECT_EQ(recovered.outcome.decision, FixDecision::kBiasCompensated);
   EXPECT_NEAR(recovered.radius_m, 60.0, 1e-9);
-  EXPECT_NE(recovered.verdict.reason, "");
+  EXPECT_NE(recovered.outcome.reason, "");
   // The way back is gated in the same way, and ends in the same way.
-  EXPECT_EQ(tracker.process(fix_at(26, {0.0, 0.0}), {0.0, 0.0}).verdict.decision, FixDecision::kRejectedGate);
+  EXPECT_EQ(tracker.process(fix_at(26, {0.0, 0.0}), {0.0, 0.0}).outcome.decision, FixDecision::kRejectedGate);
   for (int k = 27; k <= 40; ++k) tracker.process(fix_at(k, {0.0, 0.0}), {0.0, 0.0});
   EXPECT_LT(tracker.estimate().radius_m, 0.5);
   EXPECT_FALSE(tracker.estimate().in_shadow);
@@ -214,19 +214,19 @@ TEST(BiasTracker, OneGoodFixStartsTheTimeoutAnew) {
   for (int k = 0; k <= 100; ++k) {
     const bool jumps = k > 20 && k % 4 != 0;
     const BiasEstimate& e = tracker.process(fix_at(k, {jumps ? 60.0 : 0.0, 0.0}), {0.0, 0.0});
-    EXPECT_EQ(is_rejected(e.verdict.decision), jumps) << k;
+    EXPECT_EQ(is_rejected(e.outcome.decision), jumps) << k;
   }
 }
 
 TEST(BiasTracker, ValidationsDecisionIsPassedOn) {
   BiasTracker tracker({});
-  FixVerdict inflated;
+  FixOutcome inflated;
   inflated.decision = FixDecision::kInflated;
   inflated.covariance_clamped = true;
   const BiasEstimate& e = tracker.process(fix_at(1, {0.0, 0.0}), {0.0, 0.0}, inflated);
-  EXPECT_EQ(e.verdict.decision, FixDecision::kInflated);
-  EXPECT_TRUE(e.verdict.covariance_clamped);
-  EXPECT_EQ(tracker.process(fix_at(2, {0.0, 0.0}), {0.0, 0.0}).verdict.decision, FixDecision::kAccepted);
+  EXPECT_EQ(e.outcome.decision, FixDecision::kInflated);
+  EXPECT_TRUE(e.outcome.covariance_clamped);
+  EXPECT_EQ(tracker.process(fix_at(2, {0.0, 0.0}), {0.0, 0.0}).outcome.decision, FixDecision::kAccepted);
 }
 
 TEST(BiasTracker, ResetForgetsEverything) {
@@ -240,7 +240,7 @@ TEST(BiasTracker, ResetForgetsEverything) {
     const BiasEstimate b = fresh.process(fix_at(k, {1.0, 2.0}), {0.0, 0.0});
     EXPECT_EQ(a.bias, b.bias);
     EXPECT_EQ(a.covariance, b.covariance);
-    EXPECT_EQ(a.verdict.nis, b.verdict.nis);
+    EXPECT_EQ(a.outcome.nis, b.outcome.nis);
   }
 }
 
@@ -251,7 +251,7 @@ TEST(BiasTracker, EveryParameterHasAnEffect) {
     for (int k = 0; k < 40; ++k) {
       const double bias = k == 10 ? 14.0 : k < 20 ? 0.8 * k : 70.0;
       const BiasEstimate& e = tracker.process(fix_at(k, {bias, 2.0}), {1.0, 0.0});
-      values.insert(values.end(), {e.radius_m, e.shadow_threshold, double(e.verdict.decision)});
+      values.insert(values.end(), {e.radius_m, e.shadow_threshold, double(e.outcome.decision)});
     }
     return values;
   };

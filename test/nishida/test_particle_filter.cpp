@@ -188,15 +188,15 @@ TEST(ParticleFilter, ConventionalGateRejectsAJumpThenRestartsOnIt) {
   for (int k = 1; k <= 10; ++k) EXPECT_EQ(filter.correct(fix_at(k, {0.0, 0.0}, 2.0)).decision, FixDecision::kAccepted);
   const Pose2 before = filter.pose();
   for (int k = 11; k < 15; ++k) {
-    const FixVerdict verdict = filter.correct(fix_at(k, {300.0, 400.0}, 2.0));
-    EXPECT_EQ(verdict.decision, FixDecision::kRejectedGate);
-    EXPECT_NEAR(verdict.nis_threshold, chi_squared_quantile(0.99, 2), 1e-9);
-    EXPECT_GT(verdict.nis, verdict.nis_threshold);
+    const FixOutcome outcome = filter.correct(fix_at(k, {300.0, 400.0}, 2.0));
+    EXPECT_EQ(outcome.decision, FixDecision::kRejectedGate);
+    EXPECT_NEAR(outcome.nis_threshold, chi_squared_quantile(0.99, 2), 1e-9);
+    EXPECT_GT(outcome.nis, outcome.nis_threshold);
     EXPECT_EQ(filter.pose(), before);
   }
-  const FixVerdict verdict = filter.correct(fix_at(15, {300.0, 400.0}, 2.0));
-  EXPECT_FALSE(is_rejected(verdict.decision));
-  EXPECT_NE(verdict.reason, "");
+  const FixOutcome outcome = filter.correct(fix_at(15, {300.0, 400.0}, 2.0));
+  EXPECT_FALSE(is_rejected(outcome.decision));
+  EXPECT_NE(outcome.reason, "");
   EXPECT_LT((filter.pose().position() - Eigen::Vector2d(300.0, 400.0)).norm(), 1.0);
   EXPECT_NEAR(filter.pose().yaw, 1.0, 0.1);  // the heading is kept
 }
@@ -231,8 +231,8 @@ TEST(ParticleFilter, HeadingOfTheFixCountsTheTurnSinceTheLastEq12) {
 TEST(ParticleFilter, FixThatNoParticleExplainsDoesNotAbort) {
   ParticleFilter filter(small(), {});
   filter.initialize(pose_with_sigma({1.0, 2.0, 0.5}, 1.0, 0.1));
-  const FixVerdict verdict = filter.correct(fix_at(1.0, {1e200, 0.0}, 1.0));
-  EXPECT_EQ(verdict.decision, FixDecision::kRejectedDegenerate);
+  const FixOutcome outcome = filter.correct(fix_at(1.0, {1e200, 0.0}, 1.0));
+  EXPECT_EQ(outcome.decision, FixDecision::kRejectedDegenerate);
   EXPECT_TRUE(is_finite(filter.pose()));
   EXPECT_TRUE(filter.estimate().covariance.allFinite());
   EXPECT_FALSE(is_rejected(filter.correct(fix_at(2.0, {1.0, 2.0}, 1.0)).decision));

@@ -53,17 +53,17 @@ TEST(VoxelRayTracer, IsRightButForRaysWithinHalfASampleOfAnEdge) {
         ++at_edges;
         continue;
       }
-      const RayVerdict verdict = tracer.trace(antenna, direction);
-      ASSERT_EQ(verdict.blocked, inner.has_value()) << spacing_m << " m, ray " << i;
-      ASSERT_EQ(verdict.vegetation_m, 0.0);
-      if (!verdict.blocked) {
-        ASSERT_EQ(verdict.range_m, kInfinity);
+      const RayOutcome outcome = tracer.trace(antenna, direction);
+      ASSERT_EQ(outcome.blocked, inner.has_value()) << spacing_m << " m, ray " << i;
+      ASSERT_EQ(outcome.vegetation_m, 0.0);
+      if (!outcome.blocked) {
+        ASSERT_EQ(outcome.range_m, kInfinity);
         continue;
       }
       ++blocked;
       // A triangle across the corner of two walls lies a little before either, and along a wall its depth is uncertain.
-      ASSERT_LT(verdict.range_m, *inner + 6.0 * spacing_m) << spacing_m << " m, ray " << i;
-      ASSERT_GT(verdict.range_m, *outer - 3.0 * spacing_m) << spacing_m << " m, ray " << i;
+      ASSERT_LT(outcome.range_m, *inner + 6.0 * spacing_m) << spacing_m << " m, ray " << i;
+      ASSERT_GT(outcome.range_m, *outer - 3.0 * spacing_m) << spacing_m << " m, ray " << i;
     }
     EXPECT_GT(blocked, 800);
     EXPECT_LT(at_edges, 600);
@@ -141,9 +141,9 @@ TEST(VoxelRayTracer, AgreesWithTryingAllTriangles) {
       const Eigen::Vector3d origin(-12.0, -8.0 + 16.0 * draw_uniform(engine), -8.0 + 16.0 * draw_uniform(engine));
       const Eigen::Vector3d direction =
           Eigen::Vector3d(1.0, draw_uniform(engine) - 0.5, draw_uniform(engine) - 0.5).normalized();
-      const bool verdict = tracer.trace(origin, direction).blocked;
-      blocked += verdict ? 1 : 0;
-      if (verdict) {
+      const bool outcome = tracer.trace(origin, direction).blocked;
+      blocked += outcome ? 1 : 0;
+      if (outcome) {
         EXPECT_TRUE(pierces_any(map.points(), origin, direction, link_m + 1e-3, reach_m + 1e-3, kInfinity));
       } else {
         EXPECT_FALSE(pierces_any(map.points(), origin, direction, link_m - 1e-3, reach_m - 1e-3, reach_m - 1e-3));
@@ -181,9 +181,9 @@ TEST(VoxelRayTracer, SkippingEmptySpaceSkipsNoWall) {
     const Eigen::Vector3d direction = ray % 8 == 0   ? axis
                                       : ray % 2 == 0 ? draw_sky_direction(engine, -0.5)
                                                      : (points[target].cast<double>() + beside - origin).normalized();
-    const bool verdict = tracer.trace(origin, direction).blocked;
-    blocked += verdict ? 1 : 0;
-    if (verdict) {
+    const bool outcome = tracer.trace(origin, direction).blocked;
+    blocked += outcome ? 1 : 0;
+    if (outcome) {
       EXPECT_TRUE(pierces_any(points, origin, direction, link_m + 1e-3, reach_m + 1e-3, kInfinity)) << ray;
     } else {
       EXPECT_FALSE(pierces_any(points, origin, direction, link_m - 1e-3, reach_m - 1e-3, reach_m - 1e-3)) << ray;
@@ -213,9 +213,9 @@ TEST(VoxelRayTracer, RangesAreKept) {
   parameters.max_range = 9.0;
   EXPECT_FALSE(VoxelRayTracer(map, parameters).trace(origin, Eigen::Vector3d::UnitX()).blocked);
   parameters.max_range = 11.0;
-  const RayVerdict verdict = VoxelRayTracer(map, parameters).trace(origin, Eigen::Vector3d::UnitX());
-  EXPECT_TRUE(verdict.blocked);
-  EXPECT_NEAR(verdict.range_m, 10.0, 1e-3);
+  const RayOutcome outcome = VoxelRayTracer(map, parameters).trace(origin, Eigen::Vector3d::UnitX());
+  EXPECT_TRUE(outcome.blocked);
+  EXPECT_NEAR(outcome.range_m, 10.0, 1e-3);
   EXPECT_FALSE(VoxelRayTracer(map, parameters).trace(origin, -Eigen::Vector3d::UnitX()).blocked);
 }
 
@@ -251,8 +251,8 @@ TEST(RayTracers, AgreeAtEqualResolution) {
   for (int i = 0; i < kRays; ++i) {
     const Eigen::Vector3d antenna = draw_antenna(engine);
     const Eigen::Vector3d direction = draw_sky_direction(engine, 0.17);
-    const RayVerdict a = voxels.trace(antenna, direction);
-    const RayVerdict b = tree.trace(antenna, direction);
+    const RayOutcome a = voxels.trace(antenna, direction);
+    const RayOutcome b = tree.trace(antenna, direction);
     equal += a.blocked == b.blocked ? 1 : 0;
     // What the tracer without a rim calls blocked, the one with a rim calls blocked, too.
     EXPECT_TRUE(b.blocked || !a.blocked);
@@ -303,9 +303,9 @@ TEST(KdTreeRayTracer, SoManyNeighboursObstruct) {
   PointCloud cloud = {{10.0F, 0.1F, 0.0F}, {10.0F, -0.1F, 0.0F}};
   EXPECT_FALSE(KdTreeRayTracer(cloud, parameters).trace({0, 0, 0}, {1, 0, 0}).blocked);
   cloud.emplace_back(10.0F, 0.0F, 0.1F);
-  const RayVerdict verdict = KdTreeRayTracer(cloud, parameters).trace({0, 0, 0}, {1, 0, 0});
-  EXPECT_TRUE(verdict.blocked);
-  EXPECT_NEAR(verdict.range_m, 10.0, 0.5);
+  const RayOutcome outcome = KdTreeRayTracer(cloud, parameters).trace({0, 0, 0}, {1, 0, 0});
+  EXPECT_TRUE(outcome.blocked);
+  EXPECT_NEAR(outcome.range_m, 10.0, 0.5);
 }
 
 TEST(RayTracers, ParametersMustBeInOrder) {

@@ -16,9 +16,9 @@ namespace {
 /// Says what a function says.
 class FunctionTracer : public RayTracer {
  public:
-  using Function = std::function<RayVerdict(const Eigen::Vector3d&, const Eigen::Vector3d&)>;
+  using Function = std::function<RayOutcome(const Eigen::Vector3d&, const Eigen::Vector3d&)>;
   explicit FunctionTracer(Function function) : function_(std::move(function)) {}
-  RayVerdict trace(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const override {
+  RayOutcome trace(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const override {
     EXPECT_NEAR(direction.norm(), 1.0, 1e-9);
     return function_(origin, direction);
   }
@@ -27,11 +27,11 @@ class FunctionTracer : public RayTracer {
   Function function_;
 };
 
-RayVerdict blocked_if(bool blocked) {
-  RayVerdict verdict;
-  verdict.blocked = blocked;
-  if (blocked) verdict.range_m = 7.0;
-  return verdict;
+RayOutcome blocked_if(bool blocked) {
+  RayOutcome outcome;
+  outcome.blocked = blocked;
+  if (blocked) outcome.range_m = 7.0;
+  return outcome;
 }
 
 SatelliteVisibility assess(const RayTracer& tracer, const AntennaPose& antenna, const LookAngles& look,
@@ -71,7 +71,7 @@ TEST(Visibility, EastYawTurnsTheSky) {
   Eigen::Vector3d seen = Eigen::Vector3d::Zero();
   const FunctionTracer tracer([&](const Eigen::Vector3d&, const Eigen::Vector3d& d) {
     seen = d;
-    return RayVerdict();
+    return RayOutcome();
   });
   AntennaPose antenna;
   antenna.east_yaw_rad = 0.3;
@@ -87,7 +87,7 @@ TEST(Visibility, RaysStartAcrossTheDirection) {
     EXPECT_NEAR(origin.y(), 0.0, 1e-12);
     EXPECT_EQ(origin.z(), 2.0);
     east.push_back(origin.x());
-    return RayVerdict();
+    return RayOutcome();
   });
   AntennaPose antenna;
   antenna.position = {0.0, 0.0, 2.0};
@@ -102,7 +102,7 @@ TEST(Visibility, RoundingNeitherPassesTheZenithNorTheHorizon) {
   const FunctionTracer tracer([](const Eigen::Vector3d& origin, const Eigen::Vector3d& d) {
     EXPECT_TRUE(origin.allFinite() && d.allFinite());
     EXPECT_GE(d.z(), -1e-12);
-    return RayVerdict();
+    return RayOutcome();
   });
   AntennaPose antenna;
   antenna.position_sigma_m = 1.0;
@@ -115,9 +115,9 @@ TEST(Visibility, VegetationCountsByItsLength) {
   for (const auto& [length_m, fraction] : {std::pair{0.0, 0.0}, {5.0, 0.5}, {10.0, 1.0}, {50.0, 1.0}}) {
     const double vegetation_m = length_m;
     const FunctionTracer tracer([&](const Eigen::Vector3d&, const Eigen::Vector3d&) {
-      RayVerdict verdict;
-      verdict.vegetation_m = vegetation_m;
-      return verdict;
+      RayOutcome outcome;
+      outcome.vegetation_m = vegetation_m;
+      return outcome;
     });
     EXPECT_NEAR(assess(tracer, AntennaPose(), {1.0, 0.5}).blocked_fraction, fraction, 1e-12) << length_m;
   }

@@ -230,11 +230,11 @@ TEST(VoxelMap, PermeabilityTellsAHedgeFromAWall) {
   {
     VoxelMap map(parameters);
     drive_past(map, 0.3, 0.5, engine);
-    const RayVerdict near = VoxelRayTracer(map, {0.0, 20.0}).trace({0, 0, 1.5}, up);
+    const RayOutcome near = VoxelRayTracer(map, {0.0, 20.0}).trace({0, 0, 1.5}, up);
     EXPECT_FALSE(near.blocked);
     EXPECT_GT(near.vegetation_m, 0.2);
     // Behind the hedge stands a wall, which is no hedge.
-    const RayVerdict far = VoxelRayTracer(map, {}).trace({0, 0, 1.5}, up);
+    const RayOutcome far = VoxelRayTracer(map, {}).trace({0, 0, 1.5}, up);
     EXPECT_TRUE(far.blocked);
     EXPECT_NEAR(far.range_m, 25.0 / up.y(), 0.5);
     std::vector<double> shares;
@@ -247,9 +247,9 @@ TEST(VoxelMap, PermeabilityTellsAHedgeFromAWall) {
   {
     VoxelMap map(parameters);
     drive_past(map, 1.0, 0.05, engine);
-    const RayVerdict verdict = VoxelRayTracer(map, {}).trace({0, 0, 1.5}, up);
-    EXPECT_TRUE(verdict.blocked);
-    EXPECT_EQ(verdict.vegetation_m, 0.0);
+    const RayOutcome outcome = VoxelRayTracer(map, {}).trace({0, 0, 1.5}, up);
+    EXPECT_TRUE(outcome.blocked);
+    EXPECT_EQ(outcome.vegetation_m, 0.0);
     for (const Eigen::Vector3f& point : map.points_within({0, 10, 2}, 4.0)) {
       EXPECT_LT(map.permeability(map.find(point.cast<double>())), 0.2);
     }

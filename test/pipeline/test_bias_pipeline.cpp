@@ -133,9 +133,9 @@ TEST(BiasPipeline, RejectedFixSaysSoAndKeepsTheBias) {
   rig.fix(10.0);
   const auto estimates = rig.take();
   ASSERT_EQ(estimates.size(), 2u);
-  EXPECT_EQ(estimates[0].verdict.decision, FixDecision::kRejectedStatus);
+  EXPECT_EQ(estimates[0].outcome.decision, FixDecision::kRejectedStatus);
   EXPECT_EQ(estimates[0].stamp, Rig::at(11.0));
-  EXPECT_EQ(estimates[1].verdict.decision, FixDecision::kRejectedStale);
+  EXPECT_EQ(estimates[1].outcome.decision, FixDecision::kRejectedStale);
   for (const BiasEstimate& e : estimates) EXPECT_EQ(e.bias, before.bias);
 }
 
@@ -146,7 +146,7 @@ TEST(BiasPipeline, WithoutOdometryBetweenEstimateAndFixItIsNotExamined) {
   rig.fix(5.5);
   const auto estimates = rig.take();
   ASSERT_EQ(estimates.size(), 1u);
-  EXPECT_EQ(estimates[0].verdict.decision, FixDecision::kNotExamined);
+  EXPECT_EQ(estimates[0].outcome.decision, FixDecision::kNotExamined);
   EXPECT_EQ(estimates[0].radius_m, 0.0);
 }
 
@@ -172,7 +172,7 @@ std::vector<BiasEstimate> ordinary_run(Rig& rig, bool with_bad_ones) {
   }
   std::vector<BiasEstimate> used;
   for (const BiasEstimate& e : rig.take()) {
-    if (!is_rejected(e.verdict.decision)) used.push_back(e);
+    if (!is_rejected(e.outcome.decision)) used.push_back(e);
   }
   return used;
 }
@@ -241,7 +241,7 @@ TEST(BiasPipeline, EveryParameterHasAnEffect) {
       }
       if (k == 150) rig.pipeline.add_odometry({Rig::at(0.1 * k - 0.7), {}, {}});
       for (const BiasEstimate& e : rig.take()) {
-        out << k << ' ' << e.radius_m << ' ' << e.shadow_threshold << ' ' << int(e.verdict.decision) << e.verdict.reason
+        out << k << ' ' << e.radius_m << ' ' << e.shadow_threshold << ' ' << int(e.outcome.decision) << e.outcome.reason
             << '\n';
       }
     }

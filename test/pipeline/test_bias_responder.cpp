@@ -53,7 +53,7 @@ TEST(BiasResponder, AnswersAsTheNodeDoes) {
     EXPECT_LT((a.bias - b.bias).norm(), 1e-9) << i;
     EXPECT_LT((a.covariance - b.covariance).norm(), 1e-9) << i;
     EXPECT_EQ(a.in_shadow, b.in_shadow) << i;
-    EXPECT_EQ(a.verdict.decision, b.verdict.decision) << i;
+    EXPECT_EQ(a.outcome.decision, b.outcome.decision) << i;
   }
   EXPECT_GT(both.by_node.back().radius_m, 10.0);
   EXPECT_EQ(both.rig.fake->fixes.back().bias_radius_m, both.by_responder.back().radius_m);

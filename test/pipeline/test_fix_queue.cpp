@@ -31,7 +31,7 @@ TEST(FixQueue, RejectedFixesWaitNoLongerAndAreToldOnce) {
   queue.add(at(1.0));
   queue.add(without);
   queue.add(at(1.0));  // came twice
-  const std::vector<FixVerdict> rejected = queue.validate(kFrame);
+  const std::vector<FixOutcome> rejected = queue.validate(kFrame);
   ASSERT_EQ(rejected.size(), 2u);
   EXPECT_EQ(rejected[0].decision, FixDecision::kRejectedStatus);
   EXPECT_EQ(rejected[0].stamp, from_seconds(2.0));

@@ -296,7 +296,7 @@ std::string trace(const std::string& base, const std::string& change, bool wants
   std::ostringstream out;
   const auto note = [&] {
     for (const auto& o : rig.pipeline.take_outputs()) out << o.stamp.count() << ' ' << o.estimate.pose.yaw << '\n';
-    for (const auto& v : rig.pipeline.take_verdicts()) out << int(v.decision) << v.covariance_clamped << '\n';
+    for (const auto& v : rig.pipeline.take_outcomes()) out << int(v.decision) << v.covariance_clamped << '\n';
     const LocalizationReport report = rig.pipeline.report();
     out << int(report.state) << report.healthy << report.heading_converged << ' ' << report.fixes_rejected << '\n';
   };

@@ -10,12 +10,12 @@ TEST(LocalizationPipeline, DatumComesFromAgreeingFixesWhichAreThenUsed) {
     rig.drive(0.2 * k);
     EXPECT_FALSE(rig.pipeline.frame());
     EXPECT_EQ(rig.state(), LocalizationState::kWaitingForDatum);
-    EXPECT_TRUE(rig.pipeline.take_verdicts().empty());
+    EXPECT_TRUE(rig.pipeline.take_outcomes().empty());
   }
   rig.fix(0.8);
   ASSERT_TRUE(rig.pipeline.frame());
   rig.drive(0.8);
-  EXPECT_EQ(rig.pipeline.take_verdicts().size(), 5u);  // those that waited, and the last
+  EXPECT_EQ(rig.pipeline.take_outcomes().size(), 5u);  // those that waited, and the last
   EXPECT_EQ(rig.state(), LocalizationState::kInitializing);
   // The median of the five places is the third.
   EXPECT_LT(rig.pipeline.frame()->to_local(raw_fix({}, Rig::truth(0.4).position()).position).norm(), 1e-2);

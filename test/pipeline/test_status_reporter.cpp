@@ -4,12 +4,12 @@
 namespace urban_gnss {
 namespace {
 
-FixVerdict verdict(FixDecision decision, double time, bool of_ranges = false) {
-  FixVerdict verdict;
-  verdict.decision = decision;
-  verdict.stamp = from_seconds(time);
-  verdict.of_ranges = of_ranges;
-  return verdict;
+FixOutcome outcome(FixDecision decision, double time, bool of_ranges = false) {
+  FixOutcome outcome;
+  outcome.decision = decision;
+  outcome.stamp = from_seconds(time);
+  outcome.of_ranges = of_ranges;
+  return outcome;
 }
 
 /// A localizer that is well, ten seconds after its start, with a fix just now.
@@ -22,18 +22,18 @@ struct Well {
     localizer.initialize(pose_with_sigma({}, 0.5, 0.1));
     status.last_odometry = status.last_fix = from_seconds(110.0);
     status.has_datum = status.has_started = true;
-    reporter.count(verdict(FixDecision::kAccepted, 110.0));
+    reporter.count(outcome(FixDecision::kAccepted, 110.0));
   }
   LocalizationReport report() const { return reporter.report(status, localizer); }
 };
 
 TEST(StatusReporter, CountsWhatBecameOfTheFixes) {
   StatusReporter reporter({}, 2.0);
-  reporter.note_start_fix(verdict(FixDecision::kNotExamined, 1.0), false);
+  reporter.note_start_fix(outcome(FixDecision::kNotExamined, 1.0), false);
   EXPECT_EQ(reporter.report({}, FakeLocalizer()).last_fix.stamp, from_seconds(1.0));
-  reporter.count(verdict(FixDecision::kAccepted, 2.0));
-  reporter.count(verdict(FixDecision::kInflated, 3.0, true));
-  reporter.count(verdict(FixDecision::kRejectedGate, 4.0, true));
+  reporter.count(outcome(FixDecision::kAccepted, 2.0));
+  reporter.count(outcome(FixDecision::kInflated, 3.0, true));
+  reporter.count(outcome(FixDecision::kRejectedGate, 4.0, true));
   reporter.count_velocity();
   const LocalizationReport report = reporter.report({}, FakeLocalizer());
   EXPECT_EQ(report.fixes_used, 2u);
@@ -50,10 +50,10 @@ TEST(StatusReporter, FixAgeIsThatOfTheLastOneUsed) {
   const auto age_s = [&] { return well.report().fix_age_s; };
   well.status.last_odometry = from_seconds(113.0);
   EXPECT_NEAR(age_s(), 3.0, 1e-9);
-  well.reporter.count(verdict(FixDecision::kRejectedGate, 112.0));
-  well.reporter.note_start_fix(verdict(FixDecision::kNotExamined, 112.0), false);
+  well.reporter.count(outcome(FixDecision::kRejectedGate, 112.0));
+  well.reporter.note_start_fix(outcome(FixDecision::kNotExamined, 112.0), false);
   EXPECT_NEAR(age_s(), 3.0, 1e-9);
-  well.reporter.note_start_fix(verdict(FixDecision::kNotExamined, 112.0), true);
+  well.reporter.note_start_fix(outcome(FixDecision::kNotExamined, 112.0), true);
   EXPECT_NEAR(age_s(), 1.0, 1e-9);
 }
 

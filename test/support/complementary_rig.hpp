@@ -24,7 +24,7 @@ struct Drive {
   OdometryErrors errors;                              ///< of the odometry, constant
   std::function<Eigen::Vector2d(double since)> bias;  ///< m, by the time since run() was called; none where empty
   double time_s{0.0};
-  FixVerdict last;
+  FixOutcome last;
 
   explicit Drive(std::uint64_t seed, const std::string& yaml = "{}", double odometry_rate_hz = 10.0)
       : parameters(with(ComplementaryEkfParameters(), yaml)),

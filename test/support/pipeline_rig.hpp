@@ -43,12 +43,12 @@ struct FakeLocalizer : Localizer {
     moves.emplace_back(twist, duration_s);
     state.pose = urban_gnss::move(state.pose, twist, duration_s);
   }
-  FixVerdict correct(const FixMeasurement& fix) override {
+  FixOutcome correct(const FixMeasurement& fix) override {
     fixes.push_back(fix);
     if (breaks) state.pose.x = kNaN;
-    FixVerdict verdict;
-    verdict.decision = FixDecision::kAccepted;
-    return verdict;
+    FixOutcome outcome;
+    outcome.decision = FixDecision::kAccepted;
+    return outcome;
   }
   bool takes_velocity() const override { return takes; }
   void correct_velocity(const VelocityMeasurement& velocity) override { velocities.push_back(velocity); }
@@ -116,8 +116,8 @@ struct Rig {
     BiasEstimate bias;
     bias.stamp = at(time);
     bias.radius_m = radius;
-    bias.verdict.decision = decision;
-    bias.verdict.stamp = bias.stamp;
+    bias.outcome.decision = decision;
+    bias.outcome.stamp = bias.stamp;
     pipeline.add_bias(bias);
   }
   LocalizationState state() const { return pipeline.report().state; }

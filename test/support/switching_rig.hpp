@@ -12,7 +12,8 @@ namespace urban_gnss {
 /// The filters for what the tests simulate: fixes whose errors are white, Gaussian and of the declared size but for a
 /// bias that walks, and odometry without a noise of its own while it moves.
 const char* const kTextbookNoise =
-    "{fix_scale_rate: 0.0, fix_covariance_weight: 1.0, fix_correlation_time: 0.0, parked_correlation_time: 0.0, student_dof: 1.0e+9, "
+    "{fix_scale_rate: 0.0, fix_covariance_weight: 1.0, fix_correlation_time: 0.0, parked_correlation_time: 0.0, "
+    "student_dof: 1.0e+9, "
     "bias_fade_time: 0.0, position_walk: 0.0, heading_walk: 0.0, motion_noise_factor: 0.1, speed_scale_sigma: 0.03, "
     "yaw_rate_bias_walk: 3.0e-5, direct_time: 60.0, slow_bias_time: 20.0, fast_bias_time: 1.0, bias_end_time: 60.0, "
     "jump_share: 0.9, slow_bias_walk: 0.2, fast_bias_walk: 1.0, jump_sigma: 20.0, onset_sigma: 0.5, "
@@ -36,7 +37,7 @@ struct SwitchingStep {
   double time_s;
   double error_m;
   double nees;  ///< of x, y and yaw
-  FixVerdict verdict;
+  FixOutcome outcome;
   PoseEstimate estimate;
 };
 
@@ -71,12 +72,12 @@ inline std::vector<SwitchingStep> drive(Localizer& localizer, const SwitchingDri
     const double east = d.fix_sigma_m * draw_normal(engine);
     const double north = d.fix_sigma_m * draw_normal(engine);
     const Eigen::Vector2d position = truth.position() + d.bias(time_s) + Eigen::Vector2d(east, north);
-    const FixVerdict verdict = localizer.correct(fix_of(position, d.fix_sigma_m, time_s));
+    const FixOutcome outcome = localizer.correct(fix_of(position, d.fix_sigma_m, time_s));
     const PoseEstimate estimate = localizer.estimate();
     const Eigen::Vector3d error(estimate.pose.x - truth.x, estimate.pose.y - truth.y,
                                 angle_difference(estimate.pose.yaw, truth.yaw));
     steps.push_back(
-        {time_s, error.head<2>().norm(), error.dot(estimate.covariance.ldlt().solve(error)), verdict, estimate});
+        {time_s, error.head<2>().norm(), error.dot(estimate.covariance.ldlt().solve(error)), outcome, estimate});
   }
   return steps;
 }

@@ -34,7 +34,7 @@ class PlainEkf : public Localizer {
     pose_ = step.pose;
     covariance_ = step.transition * covariance_ * step.transition.transpose() + step.noise;
   }
-  FixVerdict correct(const FixMeasurement& fix) override {
+  FixOutcome correct(const FixMeasurement& fix) override {
     Eigen::Matrix<double, 2, kErrorStates> h = Eigen::Matrix<double, 2, kErrorStates>::Zero();
     h.leftCols<2>().setIdentity();
     const Eigen::Matrix2d s = h * covariance_ * h.transpose() + fix.covariance;
@@ -66,7 +66,7 @@ TEST(ImmEkf, IsThePlainEkfWhereNoBiasIsExpected) {
   for (std::size_t i = 0; i < without.size(); ++i) {
     EXPECT_TRUE(near(with_modes[i].estimate.pose, without[i].estimate.pose, 1e-6)) << i;
     EXPECT_TRUE(with_modes[i].estimate.covariance.isApprox(without[i].estimate.covariance, 1e-6)) << i;
-    EXPECT_EQ(with_modes[i].verdict.decision, FixDecision::kAccepted);
+    EXPECT_EQ(with_modes[i].outcome.decision, FixDecision::kAccepted);
   }
 }
 
@@ -120,7 +120,7 @@ TEST(ImmEkf, FindsABiasThatComesAtOnceAndItsEnd) {
   EXPECT_GT(rmse_between(drive(plain, d), 40.0, 80.0), 8.0);
   for (const auto& step : steps) {
     if (step.time_s > 41.0 && step.time_s < 79.0) {
-      EXPECT_EQ(step.verdict.decision, FixDecision::kBiasCompensated) << step.time_s;
+      EXPECT_EQ(step.outcome.decision, FixDecision::kBiasCompensated) << step.time_s;
     }
   }
 }
@@ -187,8 +187,8 @@ TEST(ImmEkf, ASpikeSaysNothing) {
   drive(imm, {});
   const Pose2 before = imm.pose();
   const double sigma_before = imm.health().position_spread_m;
-  const FixVerdict verdict = imm.correct(fix_of(before.position() + Eigen::Vector2d(1600.0, 0.0), 0.5, 120.5));
-  EXPECT_EQ(verdict.decision, FixDecision::kInflated);
+  const FixOutcome outcome = imm.correct(fix_of(before.position() + Eigen::Vector2d(1600.0, 0.0), 0.5, 120.5));
+  EXPECT_EQ(outcome.decision, FixDecision::kInflated);
   EXPECT_LT((imm.pose().position() - before.position()).norm(), 0.3);
   EXPECT_LT(imm.health().position_spread_m, 2.0 * sigma_before);
 }

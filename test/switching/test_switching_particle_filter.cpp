@@ -61,7 +61,7 @@ TEST(SwitchingParticleFilter, MergedParticlesAreTheInteractingModels) {
     for (std::size_t i = 0; i < a.size(); ++i) {
       // But for modes that are negligible, and left out at random.
       ASSERT_TRUE(near(a[i].estimate.pose, b[i].estimate.pose, 0.02)) << a[i].time_s;
-      ASSERT_EQ(a[i].verdict.decision, b[i].verdict.decision) << a[i].time_s;
+      ASSERT_EQ(a[i].outcome.decision, b[i].outcome.decision) << a[i].time_s;
     }
   }
 }
@@ -217,8 +217,8 @@ TEST(SwitchingParticleFilter, ASpikeSaysNothing) {
   SwitchingParticleFilter filter = make();
   drive(filter, {});
   const Pose2 before = filter.pose();
-  const FixVerdict verdict = filter.correct(fix_of(before.position() + Eigen::Vector2d(1600.0, 0.0), 0.5, 120.5));
-  EXPECT_EQ(verdict.decision, FixDecision::kInflated);
+  const FixOutcome outcome = filter.correct(fix_of(before.position() + Eigen::Vector2d(1600.0, 0.0), 0.5, 120.5));
+  EXPECT_EQ(outcome.decision, FixDecision::kInflated);
   EXPECT_LT((filter.pose().position() - before.position()).norm(), 0.3);
 }
 

@@ -41,11 +41,11 @@ struct WeighedFix {
   Eigen::Vector2d error_m{Eigen::Vector2d::Zero()};         ///< likewise
   Eigen::Matrix2d claimed{Eigen::Matrix2d::Identity()};     ///< by the receiver, m^2
   Eigen::Matrix2d covariance{Eigen::Matrix2d::Identity()};  ///< by the model, m^2
-  bool is_good{true};                                       ///< the model's verdict
+  bool is_good{true};                                       ///< the model's outcome
   bool has_map{false};                                      ///< map and heading were there
 };
 
-/// How the map's verdict on tracked satellites compares with their true line of sight.
+/// How the map's outcome on tracked satellites compares with their true line of sight.
 struct LineOfSightTally {
   /// [has a line of sight][the map says so]; blocked_threshold divides.
   std::array<std::array<std::size_t, 2>, 2> counts{};

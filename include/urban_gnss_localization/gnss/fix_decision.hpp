@@ -28,7 +28,7 @@ const char* to_string(FixDecision decision);
 inline bool is_rejected(FixDecision decision) { return decision >= FixDecision::kRejectedGate; }
 
 /// A decision with its evidence; NaN and 0 where nothing was computed.
-struct FixVerdict {
+struct FixOutcome {
   Stamp stamp{0};
   FixDecision decision{FixDecision::kNotExamined};
   double nis{std::numeric_limits<double>::quiet_NaN()};            ///< normalised innovation squared

@@ -31,10 +31,10 @@ struct FixValidationParameters {
   void check(std::vector<std::string>& faults) const;
 };
 
-/// A fix after validation. Where is_rejected(verdict.decision), `fix` holds nothing but the stamp.
+/// A fix after validation. Where is_rejected(outcome.decision), `fix` holds nothing but the stamp.
 struct ValidatedFix {
   LocalFix fix;
-  FixVerdict verdict;
+  FixOutcome outcome;
 };
 
 /// The part of validation that needs neither datum nor history: in this order, the receiver has a fix (else
@@ -53,7 +53,7 @@ bool is_usable_position(const RawFix& raw);
 /// declared, and not used, where the type is kDiagonalKnown. Where the type is kUnknown, or the block is not finite or
 /// not positive definite (all zero, say), it is that of `fix_sigma_default`. Else the axes of its ellipse are clamped
 /// to the floor and the ceiling, each in its own direction. The decision is kInflated where the default or the floor
-/// was used, else kAccepted; verdict.covariance_clamped tells of all three.
+/// was used, else kAccepted; outcome.covariance_clamped tells of all three.
 ///
 /// `last_stamp` is the stamp of the fix handled last, nothing at the start. Requires parameters without faults.
 ValidatedFix validate_fix(const RawFix& raw, const LocalFrame& frame, std::optional<Stamp> last_stamp,

@@ -19,7 +19,7 @@ struct BiasEstimate {
   double shadow_threshold{0.0};                                         ///< its chi-square quantile
   Eigen::Vector2d fix_position{Eigen::Vector2d::Zero()};                ///< m, map frame
   Eigen::Vector2d predicted_antenna_position{Eigen::Vector2d::Zero()};  ///< m, what the fix was compared with
-  FixVerdict verdict;
+  FixOutcome outcome;
 };
 
 }  // namespace urban_gnss

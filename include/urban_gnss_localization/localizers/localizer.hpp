@@ -71,8 +71,8 @@ class Localizer {
   /// Moves by one step of odometry.
   virtual void move(const Twist2& twist, double duration_s) = 0;
 
-  /// Takes one fix. The verdict carries the decision with its NIS.
-  virtual FixVerdict correct(const FixMeasurement& fix) = 0;
+  /// Takes one fix. The outcome carries the decision with its NIS.
+  virtual FixOutcome correct(const FixMeasurement& fix) = 0;
 
   /// Whether it makes use of the receiver's velocity.
   virtual bool takes_velocity() const { return false; }

@@ -43,7 +43,7 @@ class KdTreeRayTracer : public RayTracer {
   KdTreeRayTracer(const PointCloud& cloud, const KdTreeRayTracerParameters& parameters);
   ~KdTreeRayTracer() override;
 
-  RayVerdict trace(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const override;
+  RayOutcome trace(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const override;
 
  private:
   struct Tree;  // keeps PCL's headers out of this one

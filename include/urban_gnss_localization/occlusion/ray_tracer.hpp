@@ -6,7 +6,7 @@
 namespace urban_gnss {
 
 /// What a ray from the antenna towards a satellite meets.
-struct RayVerdict {
+struct RayOutcome {
   bool blocked{false};
   /// m, to the obstacle; infinite where the ray is free
   double range_m{std::numeric_limits<double>::infinity()};
@@ -20,7 +20,7 @@ class RayTracer {
   virtual ~RayTracer() = default;
 
   /// `origin` (m) is the antenna in the frame of the map, `direction` a unit vector. Free where one is not finite.
-  virtual RayVerdict trace(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const = 0;
+  virtual RayOutcome trace(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const = 0;
 };
 
 }  // namespace urban_gnss

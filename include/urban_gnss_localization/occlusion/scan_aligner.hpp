@@ -84,7 +84,7 @@ struct Alignment {
 
 /// Point-to-plane ICP (Chen & Medioni 1992) of a scan to a map with a check of its health. Nearest points come from
 /// PCL's kd-tree. The steps are taken here and not by pcl::IterativeClosestPointWithNormals, as that tells neither
-/// which points were inliers nor how well each direction was constrained, which is what the verdict needs.
+/// which points were inliers nor how well each direction was constrained, which is what the outcome needs.
 class ScanAligner {
  public:
   /// `map` (m, map frame) is copied; non-finite points are left out. Throws ParameterError.

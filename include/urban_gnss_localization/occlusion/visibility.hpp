@@ -40,7 +40,7 @@ struct VisibilityParameters {
 struct SatelliteVisibility {
   double blocked_fraction{0.0};  ///< of the rays; vegetation counts as the share of permeable_loss that it is
   double known_fraction{0.0};    ///< of the way that has been looked at, or blocked
-  bool is_blocked_ahead{false};  ///< the verdict of the central ray alone
+  bool is_blocked_ahead{false};  ///< the outcome of the central ray alone
   /// m, of the central ray to what blocks it; infinite where nothing does
   double range_m{std::numeric_limits<double>::infinity()};
 };

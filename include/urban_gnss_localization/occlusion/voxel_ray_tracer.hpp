@@ -43,7 +43,7 @@ class VoxelRayTracer : public RayTracer {
   /// Refers to `map`, which must outlive it. Throws ParameterError.
   VoxelRayTracer(const VoxelMap& map, const VoxelRayTracerParameters& parameters);
 
-  RayVerdict trace(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const override;
+  RayOutcome trace(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const override;
 
  private:
   const VoxelMap* map_;

@@ -56,7 +56,7 @@ class BiasPipeline {
   bool process_next_fix();
   std::optional<Pose2> pose_at(Stamp stamp) const;
   bool is_new(InputStream stream, Stamp stamp);
-  void pass_on(const FixVerdict& verdict);
+  void pass_on(const FixOutcome& outcome);
 
   BiasPipelineParameters parameters_;
   Eigen::Vector2d antenna_;  ///< m, in the base frame

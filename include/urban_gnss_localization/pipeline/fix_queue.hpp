@@ -18,7 +18,7 @@ class FixQueue {
   void add(const RawFix& fix);
   /// Validates those that waited for the datum. Returns what was decided of those that are rejected, which wait no
   /// more.
-  std::vector<FixVerdict> validate(const LocalFrame& frame);
+  std::vector<FixOutcome> validate(const LocalFrame& frame);
 
   /// The oldest of the validated fixes; null where there is none.
   const ValidatedFix* next() const { return validated_.empty() ? nullptr : &validated_.front(); }

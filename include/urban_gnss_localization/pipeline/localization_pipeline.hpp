@@ -36,7 +36,7 @@ Pose2 map_to_odometry(const LocalizationOutput& output);
 /// A fix that waits for the bias at its stamp.
 struct BiasQuery {
   LocalFix fix;
-  FixVerdict validation;
+  FixOutcome validation;
   Eigen::Vector2d predicted_antenna_position{Eigen::Vector2d::Zero()};  ///< m, map frame, at the fix's stamp
 };
 
@@ -81,7 +81,7 @@ class LocalizationPipeline {
 
   /// What came of the messages since the last call.
   std::vector<LocalizationOutput> take_outputs();
-  std::vector<FixVerdict> take_verdicts();
+  std::vector<FixOutcome> take_outcomes();
   std::vector<PipelineEvent> take_events();
   /// The biases that the localizer itself found, one a fix, where it estimates them.
   std::vector<BiasEstimate> take_bias_estimates() { return localizer_->take_bias_estimates(); }
@@ -123,8 +123,8 @@ class LocalizationPipeline {
   std::optional<Eigen::Vector2d> predicted_antenna(Stamp stamp) const;
   void guard_against_non_finite();
 
-  void decide_stale(FixVerdict verdict, const std::string& reason);
-  void decide(FixVerdict verdict);
+  void decide_stale(FixOutcome outcome, const std::string& reason);
+  void decide(FixOutcome outcome);
   void decide_unexamined(const ValidatedFix& fix, const std::string& reason, bool is_start);
   void event(PipelineEvent::Level level, const std::string& text) { events_.push_back({level, text}); }
 
@@ -144,7 +144,7 @@ class LocalizationPipeline {
   StatusReporter reporter_;
 
   std::vector<LocalizationOutput> outputs_;
-  std::vector<FixVerdict> verdicts_;
+  std::vector<FixOutcome> outcomes_;
   std::vector<PipelineEvent> events_;
 };
 

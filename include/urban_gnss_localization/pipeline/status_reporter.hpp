@@ -40,10 +40,10 @@ struct LocalizationReport {
   LocalizationState state{LocalizationState::kWaitingForOdometry};
   bool healthy{false};
   std::string reason;
-  FixVerdict last_fix;
+  FixOutcome last_fix;
   std::uint64_t fixes_used{0};
   std::uint64_t fixes_rejected{0};
-  std::uint64_t fixes_with_ranges{0};  ///< of those used, with FixVerdict::of_ranges
+  std::uint64_t fixes_with_ranges{0};  ///< of those used, with FixOutcome::of_ranges
   std::uint64_t velocities_used{0};    ///< of the receiver
   double fix_age_s{std::numeric_limits<double>::quiet_NaN()};
   double odometry_age_s{0.0};
@@ -73,9 +73,9 @@ class StatusReporter {
       : parameters_(parameters), odometry_gap_s_(odometry_gap_s) {}
 
   /// A fix was used or rejected.
-  void count(const FixVerdict& verdict);
+  void count(const FixOutcome& outcome);
   /// A fix was not examined, as it went into the start; `is_start`: the localizer started with it.
-  void note_start_fix(const FixVerdict& verdict, bool is_start);
+  void note_start_fix(const FixOutcome& outcome, bool is_start);
   void count_velocity() { ++counts_.velocities_used; }
 
   LocalizationReport report(const PipelineStatus& status, const Localizer& localizer) const;

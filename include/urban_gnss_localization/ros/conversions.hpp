@@ -88,17 +88,17 @@ geometry_msgs::TransformStamped to_map_to_odom(const LocalizationOutput& output,
 geometry_msgs::TransformStamped to_transform(const Pose2& pose, const ros::Time& time, const std::string& parent,
                                              const std::string& child);
 
-urban_gnss_localization::FixDecision to_message(const FixVerdict& verdict);
-FixVerdict to_verdict(const urban_gnss_localization::FixDecision& message);
+urban_gnss_localization::FixDecision to_message(const FixOutcome& outcome);
+FixOutcome to_outcome(const urban_gnss_localization::FixDecision& message);
 urban_gnss_localization::GpsBias to_message(const BiasEstimate& bias, const std::string& map_frame);
 BiasEstimate to_bias_estimate(const urban_gnss_localization::GpsBias& message);
 urban_gnss_localization::LocalizationStatus to_message(const LocalizationReport& report, const Localizer& localizer,
                                                        const ros::Time& time, const std::string& map_frame);
 
-/// The state once for each verdict, so that no decision goes unpublished where several came at once. Computes the
-/// state once; nothing where there is no verdict.
+/// The state once for each outcome, so that no decision goes unpublished where several came at once. Computes the
+/// state once; nothing where there is no outcome.
 std::vector<urban_gnss_localization::LocalizationStatus> to_status_messages(const LocalizationPipeline& pipeline,
-                                                                            const std::vector<FixVerdict>& verdicts,
+                                                                            const std::vector<FixOutcome>& outcomes,
                                                                             const ros::Time& time,
                                                                             const std::string& map_frame);
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "urban_gnss_localization/pipeline/stamp_monitor.hpp"
+#include "urban_gnss_localization/pipeline/pipeline_event.hpp"
 
 namespace urban_gnss {
 

@@ -96,7 +96,7 @@ void ComplementaryEkf::set_mode(ComplementaryMode mode) {
   parameters_.mode = mode;
 }
 
-FixVerdict ComplementaryEkf::correct(const FixMeasurement& fix) {
+FixOutcome ComplementaryEkf::correct(const FixMeasurement& fix) {
   const Eigen::Vector2d predicted = transform_point(pose_, fix.antenna_in_body);
   const Eigen::Vector2d lever = predicted - pose_.position();
   noise_monitor_.add(fix.position, fix.covariance, path_ + lever, path_variance_m2_,
@@ -120,19 +120,19 @@ FixVerdict ComplementaryEkf::correct(const FixMeasurement& fix) {
   }
   if (run_ && fix.time_s - run_->last_s > parameters_.lockout_gap) run_.reset();
 
-  FixVerdict verdict;
+  FixOutcome outcome;
   if (heading_search_) {
-    verdict.decision = FixDecision::kNotExamined;
-    verdict.reason =
+    outcome.decision = FixDecision::kNotExamined;
+    outcome.reason =
         search_heading(fix, innovation) ? "heading found from fixes and motion" : "used to find the heading";
   } else {
-    decide(innovation, verdict);
+    decide(innovation, outcome);
   }
   last_fix_s_ = fix.time_s;
   had_fix_ = true;
   since_fix_ = {};
-  publish(fix, predicted, verdict);
-  return verdict;
+  publish(fix, predicted, outcome);
+  return outcome;
 }
 
 bool ComplementaryEkf::is_adaptive() const {
@@ -164,40 +164,40 @@ bool ComplementaryEkf::search_heading(const FixMeasurement& fix, const Innovatio
   return true;
 }
 
-void ComplementaryEkf::decide(const Innovation& innovation, FixVerdict& verdict) {
+void ComplementaryEkf::decide(const Innovation& innovation, FixOutcome& outcome) {
   const Eigen::Matrix2d covariance = prediction_covariance(innovation) + innovation.declared;
   last_test_covariance_ = covariance;
-  verdict.nis_dof = kFixDof;
-  verdict.nis_threshold = detector_.threshold();
-  verdict.decision = FixDecision::kAccepted;
+  outcome.nis_dof = kFixDof;
+  outcome.nis_threshold = detector_.threshold();
+  outcome.decision = FixDecision::kAccepted;
   if (is_open_) {
-    decide_open(innovation, verdict);
+    decide_open(innovation, outcome);
     return;
   }
   const BiasDetection detection = detector_.test(innovation.value, covariance);
-  verdict.nis = detection.nis;
+  outcome.nis = detection.nis;
   is_inert_ = detection.is_inert;
   const bool is_biased = is_adaptive() ? detection.is_biased() : detection.is_jump;
   if (parameters_.mode == ComplementaryMode::kStandard || !is_biased) {
     run_.reset();
     apply(innovation);
-    if (is_inert_) verdict.reason = "gate inert: the fixes scatter far less than their covariance says";
+    if (is_inert_) outcome.reason = "gate inert: the fixes scatter far less than their covariance says";
     return;
   }
-  if (detection.is_ramp) verdict.reason = "the fixes drift away from the odometry";
+  if (detection.is_ramp) outcome.reason = "the fixes drift away from the odometry";
   if (parameters_.mode == ComplementaryMode::kGated) {
-    reject(innovation, verdict);
+    reject(innovation, outcome);
   } else {
-    open_or_reject(innovation, verdict);
+    open_or_reject(innovation, outcome);
   }
 }
 
-void ComplementaryEkf::open_or_reject(const Innovation& innovation, FixVerdict& verdict) {
+void ComplementaryEkf::open_or_reject(const Innovation& innovation, FixOutcome& outcome) {
   const Eigen::Matrix2d m0 = parameters_.fix_bias_sigma * parameters_.fix_bias_sigma * Eigen::Matrix2d::Identity();
   const Eigen::Matrix2d covariance = prediction_covariance(innovation) + innovation.declared + m0;
   if (normalised_innovation_squared(innovation.value, covariance) > detector_.threshold()) {
-    verdict.reason = "farther away than a bias explains";
-    reject(innovation, verdict);
+    outcome.reason = "farther away than a bias explains";
+    reject(innovation, outcome);
     return;
   }
   filter_.open_bias(m0);
@@ -208,81 +208,81 @@ void ComplementaryEkf::open_or_reject(const Innovation& innovation, FixVerdict& 
   insignificant_ = 0;
   doubt(innovation);
   apply(innovation);
-  verdict.decision = FixDecision::kBiasCompensated;
+  outcome.decision = FixDecision::kBiasCompensated;
 }
 
-void ComplementaryEkf::decide_open(const Innovation& innovation, FixVerdict& verdict) {
+void ComplementaryEkf::decide_open(const Innovation& innovation, FixOutcome& outcome) {
   const Eigen::Vector2d compensated = innovation.value - filter_.bias();
-  verdict.nis = normalised_innovation_squared(
+  outcome.nis = normalised_innovation_squared(
       compensated, filter_.innovation_covariance(innovation.observation, kBiasObservation, innovation.declared));
   const double direct =
       normalised_innovation_squared(innovation.value, prediction_covariance(innovation) + innovation.declared);
-  if (!is_confirmed_ && is_false_alarm(innovation, direct, verdict)) return;
-  if (verdict.nis <= detector_.threshold()) {
+  if (!is_confirmed_ && is_false_alarm(innovation, direct, outcome)) return;
+  if (outcome.nis <= detector_.threshold()) {
     is_confirmed_ = true;
     doubt(innovation);
     apply(innovation);
-    verdict.decision = FixDecision::kBiasCompensated;
-    close_if_insignificant(innovation, verdict);
+    outcome.decision = FixDecision::kBiasCompensated;
+    close_if_insignificant(innovation, outcome);
     return;
   }
   // The bias has jumped: away, or to another.
   if (direct <= detector_.threshold()) {
     close();
-    verdict.nis = direct;
-    verdict.reason = "the bias has ended";
+    outcome.nis = direct;
+    outcome.reason = "the bias has ended";
     apply(innovation);
     return;
   }
-  open_or_reject(innovation, verdict);
+  open_or_reject(innovation, outcome);
 }
 
-bool ComplementaryEkf::is_false_alarm(const Innovation& innovation, double direct_nis, FixVerdict& verdict) {
+bool ComplementaryEkf::is_false_alarm(const Innovation& innovation, double direct_nis, FixOutcome& outcome) {
   const Eigen::Matrix2d without = prediction_covariance(innovation) + innovation.declared;
   const Eigen::Matrix2d with =
       filter_.innovation_covariance(innovation.observation, kBiasObservation, innovation.declared);
   // Likelihood of the fix without a bias against that with the bias that the last fix showed.
   const bool speaks_for_none = direct_nis <= detector_.threshold() && direct_nis + std::log(without.determinant()) <
-                                                                          verdict.nis + std::log(with.determinant());
+                                                                          outcome.nis + std::log(with.determinant());
   if (!speaks_for_none) return false;
   Innovation unbiased = innovation;
   if (opening_nis_ <= spike_threshold_) {
     filter_.discard_bias();  // the fix that raised the alarm counts after all
     unbiased.value -= innovation.observation * filter_.bias_free_state();
     feed_back();
-    verdict.reason = "the bias was a false alarm";
+    outcome.reason = "the bias was a false alarm";
   } else {
-    verdict.reason = "the bias was a spike";
+    outcome.reason = "the bias was a spike";
   }
   close();
-  verdict.nis = direct_nis;
+  outcome.nis = direct_nis;
   apply(unbiased);
   return true;
 }
 
-void ComplementaryEkf::close_if_insignificant(const Innovation& innovation, FixVerdict& verdict) {
+void ComplementaryEkf::close_if_insignificant(const Innovation& innovation, FixOutcome& outcome) {
   insignificant_ = bias_statistic() <= close_threshold_ ? insignificant_ + 1 : 0;
   if (insignificant_ >= parameters_.close_count) {
     close();
-    verdict.reason = "the bias has become insignificant";
+    outcome.reason = "the bias has become insignificant";
   } else if (parameters_.lockout_policy == LockoutPolicy::kAutomatic &&
              innovation.time_s - opened_s_ > parameters_.bias_open_timeout) {
     Innovation next = innovation;
     next.value = filter_.bias();
     restart_position(next);
-    verdict.reason = "position started anew on the fixes: the bias was significant for too long";
+    outcome.reason = "position started anew on the fixes: the bias was significant for too long";
   }
 }
 
-void ComplementaryEkf::reject(const Innovation& innovation, FixVerdict& verdict) {
+void ComplementaryEkf::reject(const Innovation& innovation, FixOutcome& outcome) {
   doubt(innovation);
-  verdict.decision = FixDecision::kRejectedGate;
-  if (verdict.reason.empty()) verdict.reason = "innovation above its gate";
+  outcome.decision = FixDecision::kRejectedGate;
+  if (outcome.reason.empty()) outcome.reason = "innovation above its gate";
   if (parameters_.lockout_policy == LockoutPolicy::kAutomatic &&
       innovation.time_s - run_->since_s >= parameters_.lockout_timeout) {
     restart_position(innovation);
-    verdict.decision = FixDecision::kInflated;
-    verdict.reason = "position started anew on the fixes after nothing but rejections";
+    outcome.decision = FixDecision::kInflated;
+    outcome.reason = "position started anew on the fixes after nothing but rejections";
   }
 }
 
@@ -354,7 +354,7 @@ LocalizerHealth ComplementaryEkf::health() const {
   return health;
 }
 
-void ComplementaryEkf::publish(const FixMeasurement& fix, const Eigen::Vector2d& predicted, const FixVerdict& verdict) {
+void ComplementaryEkf::publish(const FixMeasurement& fix, const Eigen::Vector2d& predicted, const FixOutcome& outcome) {
   constexpr std::size_t kMostKept = 1000;  // where nobody takes them
   BiasEstimate estimate;
   estimate.stamp = fix.stamp;
@@ -366,8 +366,8 @@ void ComplementaryEkf::publish(const FixMeasurement& fix, const Eigen::Vector2d&
   estimate.in_shadow = estimate.shadow_statistic > close_threshold_;
   estimate.fix_position = fix.position;
   estimate.predicted_antenna_position = predicted;
-  estimate.verdict = verdict;
-  estimate.verdict.stamp = fix.stamp;
+  estimate.outcome = outcome;
+  estimate.outcome.stamp = fix.stamp;
   if (bias_estimates_.size() >= kMostKept) bias_estimates_.erase(bias_estimates_.begin());
   bias_estimates_.push_back(std::move(estimate));
 }

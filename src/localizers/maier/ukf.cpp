@@ -145,27 +145,27 @@ Ukf::Prediction Ukf::predict(const Eigen::Vector2d& antenna_in_body) const {
   return prediction;
 }
 
-FixVerdict Ukf::correct(const FixMeasurement& fix) {
-  FixVerdict verdict;
+FixOutcome Ukf::correct(const FixMeasurement& fix) {
+  FixOutcome outcome;
   if (!is_usable(fix)) {
-    verdict.decision = FixDecision::kRejectedNonFinite;
-    verdict.reason = "position, time or covariance cannot be used";
-    return verdict;
+    outcome.decision = FixDecision::kRejectedNonFinite;
+    outcome.reason = "position, time or covariance cannot be used";
+    return outcome;
   }
   Prediction prediction = predict(fix.antenna_in_body);
   const Eigen::Vector2d innovation = fix.position - prediction.position;
-  verdict.nis = innovation.dot((prediction.covariance + fix.covariance).ldlt().solve(innovation));
-  verdict.nis_dof = kFixDof;
-  verdict.nis_threshold = nis_threshold_;
-  verdict.decision = FixDecision::kAccepted;
-  if (is_settled_by_gate(fix, innovation, verdict)) return verdict;
+  outcome.nis = innovation.dot((prediction.covariance + fix.covariance).ldlt().solve(innovation));
+  outcome.nis_dof = kFixDof;
+  outcome.nis_threshold = nis_threshold_;
+  outcome.decision = FixDecision::kAccepted;
+  if (is_settled_by_gate(fix, innovation, outcome)) return outcome;
 
   double weight = 1.0;
   if (parameters_.outliers == OutlierPolicy::kStudentT) {
-    weight = std::min(1.0, (parameters_.student_dof + kFixDof) / (parameters_.student_dof + verdict.nis));
-    if (verdict.nis > nis_threshold_) {
-      verdict.decision = FixDecision::kInflated;
-      verdict.reason = "outlier, weight " + std::to_string(weight);
+    weight = std::min(1.0, (parameters_.student_dof + kFixDof) / (parameters_.student_dof + outcome.nis));
+    if (outcome.nis > nis_threshold_) {
+      outcome.decision = FixDecision::kInflated;
+      outcome.reason = "outlier, weight " + std::to_string(weight);
     }
   }
   const Eigen::Matrix2d noise = correlation_inflation(fix.time_s) / weight * fix.covariance;
@@ -173,26 +173,26 @@ FixVerdict Ukf::correct(const FixMeasurement& fix) {
   const Eigen::Matrix<double, kDimension, 2> gain =
       innovation_covariance.ldlt().solve(prediction.with_state.transpose()).transpose();
   if (!accept(state_ + gain * innovation, covariance_ - gain * innovation_covariance * gain.transpose())) {
-    verdict.decision = FixDecision::kRejectedDegenerate;
-    verdict.reason = "the update is not finite";
-    return verdict;
+    outcome.decision = FixDecision::kRejectedDegenerate;
+    outcome.reason = "the update is not finite";
+    return outcome;
   }
   last_used_s_ = fix.time_s;
-  return verdict;
+  return outcome;
 }
 
 double Ukf::correlation_inflation(double time_s) const {
   return last_used_s_ ? markov_inflation(time_s - *last_used_s_, parameters_.fix_correlation_time) : 1.0;
 }
 
-bool Ukf::is_settled_by_gate(const FixMeasurement& fix, const Eigen::Vector2d& innovation, FixVerdict& verdict) {
-  if (parameters_.outliers != OutlierPolicy::kGate || verdict.nis <= nis_threshold_) {
+bool Ukf::is_settled_by_gate(const FixMeasurement& fix, const Eigen::Vector2d& innovation, FixOutcome& outcome) {
+  if (parameters_.outliers != OutlierPolicy::kGate || outcome.nis <= nis_threshold_) {
     rejected_since_s_.reset();
     return false;
   }
   if (!rejected_since_s_) rejected_since_s_ = fix.time_s;
   if (fix.time_s - *rejected_since_s_ < parameters_.gate_timeout) {
-    verdict.decision = FixDecision::kRejectedGate;
+    outcome.decision = FixDecision::kRejectedGate;
     return true;
   }
   // Locked out for so long: the estimate is wrong, not the fixes. All but the position is kept.
@@ -203,12 +203,12 @@ bool Ukf::is_settled_by_gate(const FixMeasurement& fix, const Eigen::Vector2d& i
   covariance.leftCols<2>().setZero();
   covariance.topLeftCorner<2, 2>() = fix.covariance;
   if (!accept(state, covariance)) {
-    verdict.decision = FixDecision::kRejectedDegenerate;
+    outcome.decision = FixDecision::kRejectedDegenerate;
     return true;
   }
   rejected_since_s_.reset();
   last_used_s_ = fix.time_s;
-  verdict.reason = "restarted on the fix after " + std::to_string(parameters_.gate_timeout) + " s of rejections";
+  outcome.reason = "restarted on the fix after " + std::to_string(parameters_.gate_timeout) + " s of rejections";
   return true;
 }
 

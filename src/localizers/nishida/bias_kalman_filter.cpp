@@ -84,7 +84,7 @@ void BiasTracker::start(const Eigen::Vector2d& measurement) {
 }
 
 const BiasEstimate& BiasTracker::process(const LocalFix& fix, const Eigen::Vector2d& predicted_antenna_position,
-                                         const FixVerdict& validation) {
+                                         const FixOutcome& validation) {
   const bool on_position = parameters_.bias_input == BiasInput::kPosition;
   const Eigen::Vector2d measurement =
       on_position ? fix.position : Eigen::Vector2d(fix.position - predicted_antenna_position);
@@ -100,17 +100,17 @@ const BiasEstimate& BiasTracker::process(const LocalFix& fix, const Eigen::Vecto
   estimate_.fix_position = fix.position;
   estimate_.predicted_antenna_position = predicted_antenna_position;
 
-  FixVerdict verdict = validation;
-  verdict.stamp = fix.stamp;
+  FixOutcome outcome = validation;
+  outcome.stamp = fix.stamp;
   BiasKalmanFilter::Innovation innovation = filter_.innovation(measurement, noise);
-  verdict.nis = innovation.nis();
-  verdict.nis_dof = kFixDof;
-  verdict.nis_threshold = gate_threshold_;
-  if (verdict.nis > gate_threshold_) {
+  outcome.nis = innovation.nis();
+  outcome.nis_dof = kFixDof;
+  outcome.nis_threshold = gate_threshold_;
+  if (outcome.nis > gate_threshold_) {
     if (to_seconds(fix.stamp - last_accepted_) < parameters_.gate_timeout) {
-      verdict.decision = FixDecision::kRejectedGate;
-      verdict.reason = "bias innovation above its gate";
-      estimate_.verdict = verdict;
+      outcome.decision = FixDecision::kRejectedGate;
+      outcome.reason = "bias innovation above its gate";
+      estimate_.outcome = outcome;
       return estimate_;
     }
     // Locked out: every fix has contradicted the tracked bias for so long that the bias is what is wrong.
@@ -118,8 +118,8 @@ const BiasEstimate& BiasTracker::process(const LocalFix& fix, const Eigen::Vecto
     filter_.state(0) = measurement.x();
     filter_.state(2) = measurement.y();
     innovation = filter_.innovation(measurement, noise);
-    verdict.nis = innovation.nis();
-    verdict.reason = "bias filter started anew after " + std::to_string(parameters_.gate_timeout) + " s of rejections";
+    outcome.nis = innovation.nis();
+    outcome.reason = "bias filter started anew after " + std::to_string(parameters_.gate_timeout) + " s of rejections";
   }
   filter_.correct(innovation, noise);
   last_accepted_ = fix.stamp;
@@ -130,11 +130,11 @@ const BiasEstimate& BiasTracker::process(const LocalFix& fix, const Eigen::Vecto
   estimate_.radius_m = estimate_.bias.norm();
   estimate_.shadow_statistic = estimate_.bias.dot(estimate_.covariance.ldlt().solve(estimate_.bias));
   estimate_.in_shadow = estimate_.shadow_statistic > estimate_.shadow_threshold;
-  verdict.decision = estimate_.in_shadow ? FixDecision::kBiasCompensated
+  outcome.decision = estimate_.in_shadow ? FixDecision::kBiasCompensated
                      : is_rejected(validation.decision) || validation.decision == FixDecision::kNotExamined
                          ? FixDecision::kAccepted
                          : validation.decision;
-  estimate_.verdict = verdict;
+  estimate_.outcome = outcome;
   return estimate_;
 }
 

@@ -75,10 +75,10 @@ void ParticleFilter::move(const Twist2& twist, double duration_s) {
   turn_since_fix_ += twist.yaw_rate_radps * duration_s;
 }
 
-FixVerdict ParticleFilter::correct(const FixMeasurement& fix) {
-  FixVerdict verdict;
-  examine(fix, verdict);
-  if (is_gated(fix, verdict)) return verdict;
+FixOutcome ParticleFilter::correct(const FixMeasurement& fix) {
+  FixOutcome outcome;
+  examine(fix, outcome);
+  if (is_gated(fix, outcome)) return outcome;
   last_accepted_time_s_ = fix.time_s;
   had_fix_ = true;
 
@@ -89,8 +89,8 @@ FixVerdict ParticleFilter::correct(const FixMeasurement& fix) {
   // Weigh.
   weigh(particles_, likelihood_of(fix));
   if (!particles_.normalise()) {
-    verdict.decision = FixDecision::kRejectedDegenerate;
-    verdict.reason = "no particle has a usable weight; weights set equal";
+    outcome.decision = FixDecision::kRejectedDegenerate;
+    outcome.reason = "no particle has a usable weight; weights set equal";
   }
 
   // Estimate.
@@ -101,28 +101,28 @@ FixVerdict ParticleFilter::correct(const FixMeasurement& fix) {
 
   // Resample.
   if (effective_sample_size_ < parameters_.ess_threshold) resampler_.resample(particles_, engine_);
-  return verdict;
+  return outcome;
 }
 
-void ParticleFilter::examine(const FixMeasurement& fix, FixVerdict& verdict) const {
+void ParticleFilter::examine(const FixMeasurement& fix, FixOutcome& outcome) const {
   const Eigen::Matrix2d spread = covariance_about(particles_, circular_mean(particles_)).topLeftCorner<2, 2>();
   const Eigen::Vector2d innovation = fix.position - transform_point(estimate_, fix.antenna_in_body);
-  verdict.nis = innovation.dot((spread + fix.covariance).ldlt().solve(innovation));
-  verdict.nis_dof = kFixDof;
-  verdict.nis_threshold = nis_threshold_;
-  verdict.decision = FixDecision::kAccepted;
+  outcome.nis = innovation.dot((spread + fix.covariance).ldlt().solve(innovation));
+  outcome.nis_dof = kFixDof;
+  outcome.nis_threshold = nis_threshold_;
+  outcome.decision = FixDecision::kAccepted;
   // The proposed filter does not turn away a fix that direct reception cannot explain: the ring explains it.
-  if (wants_bias() && verdict.nis > nis_threshold_) verdict.decision = FixDecision::kBiasCompensated;
+  if (wants_bias() && outcome.nis > nis_threshold_) outcome.decision = FixDecision::kBiasCompensated;
 }
 
-bool ParticleFilter::is_gated(const FixMeasurement& fix, FixVerdict& verdict) {
-  if (wants_bias() || parameters_.gate_probability >= 1.0 || verdict.nis <= nis_threshold_) return false;
+bool ParticleFilter::is_gated(const FixMeasurement& fix, FixOutcome& outcome) {
+  if (wants_bias() || parameters_.gate_probability >= 1.0 || outcome.nis <= nis_threshold_) return false;
   if (!had_fix_) {
     had_fix_ = true;
     last_accepted_time_s_ = fix.time_s;
   }
   if (fix.time_s - last_accepted_time_s_ < parameters_.gate_timeout) {
-    verdict.decision = FixDecision::kRejectedGate;
+    outcome.decision = FixDecision::kRejectedGate;
     return true;
   }
   // Locked out for so long: the particles are wrong, not the fixes. The heading is kept.
@@ -135,7 +135,7 @@ bool ParticleFilter::is_gated(const FixMeasurement& fix, FixVerdict& verdict) {
   restart.covariance.bottomLeftCorner<1, 2>().setZero();
   particles_.draw_gaussian(restart, engine_);
   estimate_ = restart.pose;
-  verdict.reason = "restarted on the fix after " + std::to_string(parameters_.gate_timeout) + " s of rejections";
+  outcome.reason = "restarted on the fix after " + std::to_string(parameters_.gate_timeout) + " s of rejections";
   return false;
 }
 

@@ -11,7 +11,7 @@ namespace urban_gnss {
 namespace {
 
 constexpr int kYaw = 2;
-/// Of direct reception's normalised innovation, for the verdict alone.
+/// Of direct reception's normalised innovation, for the outcome alone.
 constexpr double kReportedQuantile = 0.99;
 constexpr BiasMode kModes[kContinuations] = {BiasMode::kDirect, BiasMode::kSlow, BiasMode::kFast, BiasMode::kJump};
 
@@ -99,24 +99,24 @@ void ImmEkf::merge(const Branches& branches) {
   probability_ << p[index_of(BiasMode::kDirect)], slow, p[index_of(BiasMode::kFast)];
 }
 
-FixVerdict ImmEkf::correct(const FixMeasurement& declared) {
-  FixVerdict verdict;
+FixOutcome ImmEkf::correct(const FixMeasurement& declared) {
+  FixOutcome outcome;
   if (!is_usable(declared)) {
-    verdict.decision = FixDecision::kRejectedNonFinite;
-    verdict.reason = "position, time or covariance cannot be used";
-    return verdict;
+    outcome.decision = FixDecision::kRejectedNonFinite;
+    outcome.reason = "position, time or covariance cannot be used";
+    return outcome;
   }
   const Gaussian before = mixture();
   const FixMeasurement fix = statistics_.effective_fix(declared, before);
   const Branches branches = branch(fix);
-  verdict.of_ranges = statistics_.of_ranges();
-  verdict.nis = branches.updates[index_of(BiasMode::kDirect)].nis;
-  verdict.nis_dof = kFixDof;
-  verdict.nis_threshold = nis_threshold_;
+  outcome.of_ranges = statistics_.of_ranges();
+  outcome.nis = branches.updates[index_of(BiasMode::kDirect)].nis;
+  outcome.nis_dof = kFixDof;
+  outcome.nis_threshold = nis_threshold_;
   if (!branches.are_finite) {
-    verdict.decision = FixDecision::kRejectedDegenerate;
-    verdict.reason = "the update is not finite";
-    return verdict;
+    outcome.decision = FixDecision::kRejectedDegenerate;
+    outcome.reason = "the update is not finite";
+    return outcome;
   }
   double any_outlier = 0.0;
   double exceeding = 0.0;
@@ -128,12 +128,12 @@ FixVerdict ImmEkf::correct(const FixMeasurement& declared) {
   merge(branches);
   statistics_.compare_with_odometry(fix, before, mixture());
 
-  verdict.decision = probability_[0] >= 0.5 ? FixDecision::kAccepted : FixDecision::kBiasCompensated;
+  outcome.decision = probability_[0] >= 0.5 ? FixDecision::kAccepted : FixDecision::kBiasCompensated;
   if (any_outlier > 0.5) {
-    verdict.decision = FixDecision::kInflated;
-    verdict.reason = "outlier, probability " + std::to_string(any_outlier);
+    outcome.decision = FixDecision::kInflated;
+    outcome.reason = "outlier, probability " + std::to_string(any_outlier);
   }
-  return verdict;
+  return outcome;
 }
 
 void ImmEkf::correct_velocity(const VelocityMeasurement& measured) {

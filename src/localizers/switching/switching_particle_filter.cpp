@@ -119,27 +119,27 @@ bool SwitchingParticleFilter::continue_all(const FixMeasurement& fix, Opinion& o
   return true;
 }
 
-FixVerdict SwitchingParticleFilter::correct(const FixMeasurement& declared) {
-  FixVerdict verdict;
+FixOutcome SwitchingParticleFilter::correct(const FixMeasurement& declared) {
+  FixOutcome outcome;
   if (!is_usable(declared)) {
-    verdict.decision = FixDecision::kRejectedNonFinite;
-    verdict.reason = "position, time or covariance cannot be used";
-    return verdict;
+    outcome.decision = FixDecision::kRejectedNonFinite;
+    outcome.reason = "position, time or covariance cannot be used";
+    return outcome;
   }
   const BiasGaussian before = mixture();
   const FixMeasurement fix = statistics_.effective_fix(declared, before);
-  verdict.of_ranges = statistics_.of_ranges();
+  outcome.of_ranges = statistics_.of_ranges();
   const Eigen::Vector2d innovation = fix.position - transform_point(estimate_, fix.antenna_in_body);
   const Eigen::Matrix2d covariance =
       before.covariance.topLeftCorner<2, 2>() + parameters_.model.fix.direct_covariance(fix.covariance);
-  verdict.nis = innovation.dot(covariance.inverse() * innovation);
-  verdict.nis_dof = kFixDof;
-  verdict.nis_threshold = nis_threshold_;
+  outcome.nis = innovation.dot(covariance.inverse() * innovation);
+  outcome.nis_dof = kFixDof;
+  outcome.nis_threshold = nis_threshold_;
   Opinion opinion;
   if (!continue_all(fix, opinion)) {
-    verdict.decision = FixDecision::kRejectedDegenerate;
-    verdict.reason = "no particle can take the fix";
-    return verdict;
+    outcome.decision = FixDecision::kRejectedDegenerate;
+    outcome.reason = "no particle can take the fix";
+    return outcome;
   }
   reducer_.select(next_, most_, engine_);
   hypotheses_.swap(next_);
@@ -148,12 +148,12 @@ FixVerdict SwitchingParticleFilter::correct(const FixMeasurement& declared) {
   draw_cloud();
   find_clusters();
 
-  verdict.decision = mode_probabilities()[0] >= 0.5 ? FixDecision::kAccepted : FixDecision::kBiasCompensated;
+  outcome.decision = mode_probabilities()[0] >= 0.5 ? FixDecision::kAccepted : FixDecision::kBiasCompensated;
   if (opinion.outlier > 0.5) {
-    verdict.decision = FixDecision::kInflated;
-    verdict.reason = "outlier, probability " + std::to_string(opinion.outlier);
+    outcome.decision = FixDecision::kInflated;
+    outcome.reason = "outlier, probability " + std::to_string(opinion.outlier);
   }
-  return verdict;
+  return outcome;
 }
 
 void SwitchingParticleFilter::correct_velocity(const VelocityMeasurement& measured) {

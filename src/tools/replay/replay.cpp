@@ -112,9 +112,9 @@ class Replay {
       write("tf", output.stamp, tf);
     }
     write_biases(pipeline_.take_bias_estimates());
-    const std::vector<FixVerdict> verdicts = pipeline_.take_verdicts();
-    for (const FixVerdict& verdict : verdicts) ++decisions_[to_string(verdict.decision)];
-    for (const auto& status : to_status_messages(pipeline_, verdicts, to_ros(newest_), shell_.frames.map)) {
+    const std::vector<FixOutcome> outcomes = pipeline_.take_outcomes();
+    for (const FixOutcome& outcome : outcomes) ++decisions_[to_string(outcome.decision)];
+    for (const auto& status : to_status_messages(pipeline_, outcomes, to_ros(newest_), shell_.frames.map)) {
       write(topics::kStatus, newest_, status);
     }
   }

@@ -1,5 +1,5 @@
-// The program replay with one localizer more: what a new localizer needs is its own folder, here this file, and one line
-// of the registry, here the call of add().
+// The program replay with one localizer more: what a new localizer needs is its own folder, here this file, and one
+// line of the registry, here the call of add().
 
 #include "../../../src/tools/replay/replay.hpp"
 
@@ -24,7 +24,7 @@ class Dummy : public Localizer {
   bool wants_bias() const override { return false; }
   void initialize(const PoseEstimate& start) override { pose_ = start.pose; }
   void move(const Twist2& twist, double duration_s) override { pose_ = urban_gnss::move(pose_, twist, duration_s); }
-  FixVerdict correct(const FixMeasurement&) override { return {}; }
+  FixOutcome correct(const FixMeasurement&) override { return {}; }
   Pose2 pose() const override { return pose_; }
   PoseEstimate estimate() const override {
     return {pose_, parameters_.start_sigma * parameters_.start_sigma * Eigen::Matrix3d::Identity()};

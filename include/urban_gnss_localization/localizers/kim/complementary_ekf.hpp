@@ -106,7 +106,7 @@ class ComplementaryEkf : public Localizer {
   bool estimates_bias() const override { return true; }
   void initialize(const PoseEstimate& start) override;
   void move(const Twist2& twist, double duration_s) override;
-  FixVerdict correct(const FixMeasurement& fix) override;
+  FixOutcome correct(const FixMeasurement& fix) override;
   Pose2 pose() const override { return pose_; }
   PoseEstimate estimate() const override;
   LocalizerHealth health() const override;
@@ -156,23 +156,23 @@ class ComplementaryEkf : public Localizer {
   double noise_inflation() const;
   /// Without a heading: takes the fix for the position and for the search. True where the heading was found.
   bool search_heading(const FixMeasurement& fix, const Innovation& innovation);
-  void decide(const Innovation& innovation, FixVerdict& verdict);
-  void decide_compensated(const Innovation& innovation, const BiasDetection& detection, FixVerdict& verdict);
-  void decide_open(const Innovation& innovation, FixVerdict& verdict);
-  void open_or_reject(const Innovation& innovation, FixVerdict& verdict);
-  void reject(const Innovation& innovation, FixVerdict& verdict);
+  void decide(const Innovation& innovation, FixOutcome& outcome);
+  void decide_compensated(const Innovation& innovation, const BiasDetection& detection, FixOutcome& outcome);
+  void decide_open(const Innovation& innovation, FixOutcome& outcome);
+  void open_or_reject(const Innovation& innovation, FixOutcome& outcome);
+  void reject(const Innovation& innovation, FixOutcome& outcome);
   /// Whether the first fix after the opening speaks for no bias; ends the bias filter where it does.
-  bool is_false_alarm(const Innovation& innovation, double direct_nis, FixVerdict& verdict);
+  bool is_false_alarm(const Innovation& innovation, double direct_nis, FixOutcome& outcome);
   void close();
   void feed_back();
-  void close_if_insignificant(const Innovation& innovation, FixVerdict& verdict);
+  void close_if_insignificant(const Innovation& innovation, FixOutcome& outcome);
   void apply(const Innovation& innovation);
   void restart_position(const Innovation& innovation);
   /// Covariance of the predicted antenna by short-horizon odometry: what the tests use.
   Eigen::Matrix2d prediction_covariance(const Innovation& innovation) const;
   void doubt(const Innovation& innovation);
   double bias_statistic() const;
-  void publish(const FixMeasurement& fix, const Eigen::Vector2d& predicted, const FixVerdict& verdict);
+  void publish(const FixMeasurement& fix, const Eigen::Vector2d& predicted, const FixOutcome& outcome);
 
   ComplementaryEkfParameters parameters_;
   BiasDetector detector_;

@@ -83,7 +83,7 @@ class Ukf : public Localizer {
   /// Leaves out a step that is not finite or not positive in duration.
   void move(const Twist2& twist, double duration_s) override;
   /// kRejectedNonFinite for a fix that is not finite or has no positive definite covariance.
-  FixVerdict correct(const FixMeasurement& fix) override;
+  FixOutcome correct(const FixMeasurement& fix) override;
   Pose2 pose() const override { return {state_[0], state_[1], state_[2]}; }
   PoseEstimate estimate() const override { return {pose(), covariance_.topLeftCorner<3, 3>()}; }
   LocalizerHealth health() const override;
@@ -103,7 +103,7 @@ class Ukf : public Localizer {
   };
   Prediction predict(const Eigen::Vector2d& antenna_in_body) const;
   /// Whether the gate rejected the fix, or restarted on it.
-  bool is_settled_by_gate(const FixMeasurement& fix, const Eigen::Vector2d& innovation, FixVerdict& verdict);
+  bool is_settled_by_gate(const FixMeasurement& fix, const Eigen::Vector2d& innovation, FixOutcome& outcome);
   double correlation_inflation(double time_s) const;
   /// Takes over a new state; refuses one that is not finite.
   bool accept(State state, Covariance covariance);

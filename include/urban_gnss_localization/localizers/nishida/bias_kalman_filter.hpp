@@ -76,7 +76,7 @@ class BiasTracker {
   /// Takes one validated fix, with the antenna position that the localizer predicted for the fix's stamp from its last
   /// estimate and the odometry since. Requires stamps that ascend.
   const BiasEstimate& process(const LocalFix& fix, const Eigen::Vector2d& predicted_antenna_position,
-                              const FixVerdict& validation = {});
+                              const FixOutcome& validation = {});
 
   const BiasEstimate& estimate() const { return estimate_; }
   void reset();

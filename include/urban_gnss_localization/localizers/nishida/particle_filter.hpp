@@ -78,7 +78,7 @@ class ParticleFilter : public ParticleLocalizer {
   bool wants_bias() const override { return parameters_.mode != ParticleFilterMode::kConventional; }
   void initialize(const PoseEstimate& start) override;
   void move(const Twist2& twist, double duration_s) override;
-  FixVerdict correct(const FixMeasurement& fix) override;
+  FixOutcome correct(const FixMeasurement& fix) override;
   /// The covariance is that of all particles about the pose, other clusters included.
   PoseEstimate estimate() const override { return {estimate_, covariance_about(particles_, estimate_)}; }
   LocalizerHealth health() const override;
@@ -86,8 +86,8 @@ class ParticleFilter : public ParticleLocalizer {
  private:
   FixLikelihood likelihood_of(const FixMeasurement& fix) const;
   Pose2 posterior_mean();
-  void examine(const FixMeasurement& fix, FixVerdict& verdict) const;
-  bool is_gated(const FixMeasurement& fix, FixVerdict& verdict);
+  void examine(const FixMeasurement& fix, FixOutcome& outcome) const;
+  bool is_gated(const FixMeasurement& fix, FixOutcome& outcome);
 
   ParticleFilterParameters parameters_;
   MotionParameters motion_;

@@ -34,7 +34,7 @@ class ImmEkf : public Localizer {
   /// Leaves out a step that is not finite or not positive in duration.
   void move(const Twist2& twist, double duration_s) override;
   /// kRejectedNonFinite for a fix that is not finite or has no positive definite covariance.
-  FixVerdict correct(const FixMeasurement& fix) override;
+  FixOutcome correct(const FixMeasurement& fix) override;
   bool takes_velocity() const override { return true; }
   /// Leaves out a velocity that cannot be used.
   void correct_velocity(const VelocityMeasurement& velocity) override;
