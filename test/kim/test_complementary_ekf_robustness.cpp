@@ -266,7 +266,9 @@ std::string trace(const std::string& yaml) {
 TEST(ComplementaryEkfParameters, EachHasAnEffect) {
   const std::string reference = trace("{}");
   EXPECT_TRUE(trace("{}") == reference) << "the same input gives the same output";
-  for (const ListedParameter& listed : ParameterList().add(ComplementaryEkfParameters()).parameters()) {
+  ParameterList list;
+  list.add(ComplementaryEkfParameters());
+  for (const ListedParameter& listed : list.parameters()) {
     const std::string& name = listed.name;
     const std::string& value = listed.value;
     std::string other;

@@ -298,7 +298,9 @@ TEST(OcclusionPipeline, AHeadingThatDoesNotFitIsDoubted) {
       pipeline.set_alignment({stamp, {0.0, 0.0, yaw}, 0.0});
       pipeline.set_satellites(stamp, satellites, 0.0);
       fix = assess(pipeline, after_s);
-      if (after_s < 20.0) EXPECT_TRUE(std::isnan(fix.strong_share)) << "too early to tell: " << after_s;
+      if (after_s < 20.0) {
+        EXPECT_TRUE(std::isnan(fix.strong_share)) << "too early to tell: " << after_s;
+      }
     }
     EXPECT_EQ(fix.strong_share, yaw == 0.0 ? 0.0 : 1.0);
     EXPECT_EQ(fix.doubt.empty(), yaw == 0.0);

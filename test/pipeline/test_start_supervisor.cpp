@@ -127,7 +127,9 @@ TEST(StartSupervisor, IsLostByFarFixesAlone) {
     EXPECT_EQ(restarted.has_value(), restarts) << distance_m << ' ' << exception_m;
     EXPECT_EQ(robot.supervisor.is_lost(), restarts);
     EXPECT_EQ(robot.events.size(), restarts ? 1u : 0u);
-    if (restarted) EXPECT_EQ(*restarted, 10.0) << "lost_timeout";
+    if (restarts) {
+      EXPECT_EQ(restarted, 10.0) << "lost_timeout";
+    }
   }
 }
 
@@ -143,7 +145,9 @@ TEST(StartSupervisor, PlaceThatIsLostIsFoundFromWhatComesAfter) {
     robot.drive_to(second);
     if (second == 3) robot.supervisor.lose_place();  // what fixes said until now is forgotten
     const auto start = robot.find_start();
-    if (second <= 6) EXPECT_FALSE(start) << second;
+    if (second <= 6) {
+      EXPECT_FALSE(start) << second;
+    }
     if (start) robot.supervisor.note(*start);
   }
   EXPECT_TRUE(robot.supervisor.has_started());

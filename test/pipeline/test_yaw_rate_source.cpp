@@ -50,7 +50,7 @@ TEST(YawRateSource, ChangesOfTheSourceAreTold) {
   steps.step();
   ASSERT_EQ(steps.events.size(), 1u);
   EXPECT_EQ(steps.events[0].level, PipelineEvent::Level::kInfo);
-  for (int k = 0; k < 22; ++k) steps.step();  // held for two steps, silent for two seconds
+  for (int k = 0; k < 20; ++k) steps.step();  // held for two steps, silent for 1.8 s
   EXPECT_EQ(steps.events.size(), 1u);
   for (int k = 0; k < 50; ++k) steps.step();
   ASSERT_EQ(steps.events.size(), 2u);

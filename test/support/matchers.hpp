@@ -10,8 +10,8 @@
 
 #include "urban_gnss_localization/common/parameters.hpp"
 #include "urban_gnss_localization/common/random.hpp"
-#include "urban_gnss_localization/localizers/particle_set.hpp"
 #include "urban_gnss_localization/geometry/pose2.hpp"
+#include "urban_gnss_localization/localizers/particle_set.hpp"
 #include "urban_gnss_localization/parameters/parameter_list.hpp"
 #include "urban_gnss_localization/parameters/parameter_reader.hpp"
 
@@ -103,7 +103,9 @@ P with(P parameters, const std::string& yaml) {
 template <class P>
 std::vector<std::string> parameter_names(const P& parameters) {
   std::vector<std::string> names;
-  for (const auto& listed : ParameterList().add(parameters).parameters()) names.push_back(listed.name);
+  ParameterList list;
+  list.add(parameters);
+  for (const ListedParameter& listed : list.parameters()) names.push_back(listed.name);
   return names;
 }
 

@@ -74,7 +74,9 @@ ReplaySettings read_settings(const ReplayOptions& options, const LocalizerRegist
   settings.gps_bias.bias.input = settings.localizer.shell.localization.input;
   read(maps.of_gps_bias, std::string(kGpsBias) + ".", settings.gps_bias, faults);
   if (!faults.empty()) throw ParameterError("replay", faults);
-  for (const ListedParameter& each : ParameterList().add(settings.localizer).parameters()) {
+  ParameterList read_list;
+  read_list.add(settings.localizer);
+  for (const ListedParameter& each : read_list.parameters()) {
     if (each.name == kSeed) settings.seed = std::stoi(each.value);
   }
   return settings;
