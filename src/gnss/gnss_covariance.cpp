@@ -41,7 +41,8 @@ double nlos_by_map(const RayShares& rays, const GnssCovarianceParameters& parame
 double nlos_probability(const SatelliteObservation& satellite, const GnssCovarianceParameters& parameters) {
   const double by_map = nlos_by_map(ray_shares(satellite.blocked_fraction, satellite.known_fraction), parameters);
   if (!has_cn0(satellite)) return by_map;
-  const double by_signal = nlos_log_odds(satellite, parameters.nlos_cn0, parameters.nlos);
+  const double even_dbhz = parameters.nlos_cn0 + cn0_gain_db(satellite.look.elevation_rad, parameters.nlos);
+  const double by_signal = nlos_log_odds(satellite.cn0_dbhz, even_dbhz, parameters.nlos);
   return probability_of(by_signal + log_odds(by_map) - log_odds(parameters.nlos_if_unknown));
 }
 

@@ -38,13 +38,16 @@ NlosRange nlos_range(double elevation_rad, const NlosParameters& p, double facto
   return {scale * p.mean, scale * p.sigma};
 }
 
-double levelled_cn0_dbhz(const SatelliteObservation& satellite, const NlosParameters& p) {
-  return satellite.cn0_dbhz - p.cn0_rise * (std::sin(satellite.look.elevation_rad) - kReferenceSine);
+double cn0_gain_db(double elevation_rad, const NlosParameters& p) {
+  return p.cn0_rise * (std::sin(elevation_rad) - kReferenceSine);
 }
 
-double nlos_log_odds(const SatelliteObservation& satellite, double even_cn0_dbhz, const NlosParameters& p) {
-  const double weaker_db = even_cn0_dbhz - std::min(levelled_cn0_dbhz(satellite, p), kMaxCn0_dbhz);
-  return weaker_db / p.cn0_width;
+double levelled_cn0_dbhz(const SatelliteObservation& satellite, const NlosParameters& p) {
+  return satellite.cn0_dbhz - cn0_gain_db(satellite.look.elevation_rad, p);
+}
+
+double nlos_log_odds(double cn0_dbhz, double even_cn0_dbhz, const NlosParameters& p) {
+  return (even_cn0_dbhz - std::min(cn0_dbhz, kMaxCn0_dbhz)) / p.cn0_width;
 }
 
 double log_odds(double probability) { return std::log(probability / (1.0 - probability)); }

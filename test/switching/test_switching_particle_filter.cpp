@@ -20,6 +20,21 @@ SwitchingParticleFilterParameters switching(const std::string& changes = "{}") {
 }
 SwitchingParticleFilter make(const std::string& changes = "{}") { return {switching(changes), {}}; }
 
+/// Else std::clamp would be asked for a value between a low that is above the high.
+TEST(SwitchingParticleFilter, ParametersAreCheckedDownToThoseOfRanges) {
+  const auto faults_of = [](const char* yaml) {
+    const YAML::Node map = YAML::Load(yaml);
+    ParameterReader reader(map);
+    SwitchingParticleFilterParameters parameters;
+    reader.read(parameters);
+    return reader.finish();
+  };
+  EXPECT_TRUE(faults_of("{range_sigma_min: 5.0, range_sigma_max: 5.0}").empty());
+  const auto faults = faults_of("{range_sigma_min: 6.0, range_sigma_max: 4.0}");
+  ASSERT_EQ(faults.size(), 1u);
+  EXPECT_NE(faults.front().find("range_sigma"), std::string::npos) << faults.front();
+}
+
 /// Up to the second fix, mixing and particles are the same: all that may have happened, with its moments.
 TEST(SwitchingParticleFilter, FirstFixIsTheInteractingModels) {
   for (const char* changes :

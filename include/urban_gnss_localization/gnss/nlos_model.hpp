@@ -48,12 +48,15 @@ struct NlosRange {
 /// At this elevation, `factor` times as large as the parameters say.
 NlosRange nlos_range(double elevation_rad, const NlosParameters& parameters, double factor = 1.0);
 
+/// dB, by which C/N0 is larger at this elevation than at 37 degrees.
+double cn0_gain_db(double elevation_rad, const NlosParameters& parameters);
+
 /// C/N0 (dB-Hz) that the signal would have at 37 degrees elevation.
 double levelled_cn0_dbhz(const SatelliteObservation& satellite, const NlosParameters& parameters);
 
-/// Log-odds of an NLOS signal against one in line of sight by its C/N0, where at 37 degrees elevation the odds are even
-/// at `even_cn0_dbhz`.
-double nlos_log_odds(const SatelliteObservation& satellite, double even_cn0_dbhz, const NlosParameters& parameters);
+/// Log-odds of an NLOS signal against one in line of sight by its C/N0, where the odds are even at `even_cn0_dbhz`;
+/// both at the same elevation.
+double nlos_log_odds(double cn0_dbhz, double even_cn0_dbhz, const NlosParameters& parameters);
 
 double log_odds(double probability);
 /// The inverse, strictly between 0 and 1 for log-odds of any size.

@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <unsupported/Eigen/MatrixFunctions>
 
 #include "urban_gnss_localization/geometry/angles.hpp"
 
@@ -42,20 +43,10 @@ void normalise_rows(Rates& probabilities) {
   for (Eigen::Index row = 0; row < probabilities.rows(); ++row) probabilities.row(row) /= probabilities.row(row).sum();
 }
 
-/// exp(rates t) by scaling and squaring. Rows are normalised after every squaring, so that no rounding grows: all
-/// factors are probabilities themselves.
+/// exp(rates t), whose rows are probabilities to rounding: they are made so exactly.
 Rates transition_of(const Rates& rates, double time_s) {
-  const double most = -rates.diagonal().minCoeff() * time_s;  // expected events
-  const int squarings = most > 0.125 ? static_cast<int>(std::ceil(std::log2(most / 0.125))) : 0;
-  const Rates step = rates * std::ldexp(time_s, -squarings);
-  constexpr int kTerms = 8;  // 0.25^9 / 9! is below rounding
-  Rates result = Rates::Identity();
-  for (int k = kTerms; k > 0; --k) result = Rates::Identity() + (step * result / k).eval();
+  Rates result = (rates * time_s).exp();
   normalise_rows(result);
-  for (int i = 0; i < squarings; ++i) {
-    result = (result * result).eval();
-    normalise_rows(result);
-  }
   return result;
 }
 

@@ -1,0 +1,78 @@
+#pragma once
+
+#include "urban_gnss_localization/common/parameters.hpp"
+#include "urban_gnss_localization/localizers/kim/bias_detector.hpp"
+#include "urban_gnss_localization/localizers/kim/fix_noise_monitor.hpp"
+#include "urban_gnss_localization/motion/odometry_errors.hpp"
+
+namespace urban_gnss {
+
+enum class ComplementaryMode {
+  kStandard,     ///< the paper's conventional filter (section 2.3): every fix as it is, with its declared covariance
+  kGated,        ///< the same, but a fix whose NIS is above its quantile is rejected
+  kCompensated,  ///< the paper's: its bias is estimated; the noise of the fixes is taken as they show it
+};
+EnumNames<ComplementaryMode> enum_names(ComplementaryMode);
+
+/// What happens when the fixes contradict the estimate for long.
+enum class LockoutPolicy {
+  kAutomatic,      ///< after lockout_timeout the estimate is what is wrong: its position starts anew on the fixes
+  kDeadReckoning,  ///< the odometry is believed until a fix agrees with it again, or a pose is set
+};
+EnumNames<LockoutPolicy> enum_names(LockoutPolicy);
+
+/// The Sigma_v of Kim et al.: 0.02 of the speed and 0.03 of the yaw rate, per sqrt(Hz).
+MotionParameters kim_motion();
+
+struct ComplementaryEkfParameters {
+  ComplementaryMode mode{ComplementaryMode::kCompensated};
+  bool adapt_every_mode{true};
+  double fix_bias_sigma{20.0};
+  double fix_bias_time{30.0};
+  double close_probability{0.95};
+  int close_count{5};
+  double detection_horizon{10.0};
+  double parked_correlation_time{150.0};
+  LockoutPolicy lockout_policy{LockoutPolicy::kAutomatic};
+  double lockout_timeout{20.0};
+  double bias_open_timeout{120.0};
+  double lockout_gap{5.0};
+  bool estimate_odometry_errors{true};
+  BiasDetectorParameters detector;
+  FixNoiseParameters fix_noise;
+  OdometryErrorParameters odometry{1.0, 0.02, 2e-4, 0.005, 3e-5, 0.05, 0.003, 0.0};
+  MotionParameters motion = kim_motion();
+
+  void visit(ParameterVisitor& v) {
+    v.basic()("mode", mode,
+              "standard: all fixes as they are; gated: biased ones rejected; compensated: the bias is estimated");
+    v("adapt_every_mode", adapt_every_mode,
+      "standard and gated too: noise as the fixes show, gated also finds ramps; false: the paper's conventional filter "
+      "(section 2.3), which believes the declared covariance");
+    v("fix_bias_sigma", fix_bias_sigma, positive(), "m per axis", "M0: the bias when the filter opens");
+    v("fix_bias_time", fix_bias_time, positive(), "s",
+      "after which a bias has faded; with fix_bias_sigma this gives the growth of M");
+    v("close_probability", close_probability, between(0.01, 0.999999), "",
+      "a bias inside this quantile is insignificant");
+    v("close_count", close_count, between(1, 10000), "",
+      "of fixes with an insignificant bias after which the filter closes");
+    v("detection_horizon", detection_horizon, non_negative(), "s",
+      "of doubted fixes after which the odometry's growing uncertainty widens no test");
+    v("parked_correlation_time", parked_correlation_time, non_negative(), "s",
+      "correlation time of a fix's error while the robot stands");
+    v("lockout_policy", lockout_policy,
+      "automatic: position anew on the fixes; dead_reckoning: until a fix agrees again");
+    v("lockout_timeout", lockout_timeout, positive(), "s", "of nothing but rejected fixes");
+    v("bias_open_timeout", bias_open_timeout, positive(), "s", "of an open bias filter");
+    v("lockout_gap", lockout_gap, positive(), "s",
+      "without a fix that end such a run: after a blackout it counts anew");
+    v("estimate_odometry_errors", estimate_odometry_errors,
+      "speed scale and yaw-rate bias as states; false: the paper's (x, y, heading)");
+    v.group("detector", detector, "When a fix is taken for biased.");
+    v.group("fix_noise", fix_noise, "The noise of the fixes, as they show it.");
+    v.group("odometry", odometry, "The odometry's own errors.");
+    v.group("motion", motion, "Noise of the motion, Nishida et al. eq. (5) to (8).");
+  }
+};
+
+}  // namespace urban_gnss
