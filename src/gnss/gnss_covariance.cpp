@@ -14,6 +14,8 @@
 namespace urban_gnss {
 namespace {
 
+constexpr double kMaxCn0_dbhz = 70.0;  // beyond it, an invention of a driver
+
 /// Shares of blocked, free and unknown rays; they sum to 1.
 struct RayShares {
   double blocked;
@@ -42,7 +44,7 @@ double nlos_probability(const SatelliteObservation& satellite, const GnssCovaria
   const double by_map = nlos_by_map(ray_shares(satellite.blocked_fraction, satellite.known_fraction), parameters);
   if (!has_cn0(satellite)) return by_map;
   const double even_dbhz = parameters.nlos_cn0 + cn0_gain_db(satellite.look.elevation_rad, parameters.nlos);
-  const double by_signal = nlos_log_odds(satellite.cn0_dbhz, even_dbhz, parameters.nlos);
+  const double by_signal = nlos_log_odds(even_dbhz - std::min(satellite.cn0_dbhz, kMaxCn0_dbhz), parameters.nlos);
   return probability_of(by_signal + log_odds(by_map) - log_odds(parameters.nlos_if_unknown));
 }
 

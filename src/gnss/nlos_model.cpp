@@ -11,7 +11,6 @@ namespace {
 constexpr double kReferenceSine = 0.6;
 constexpr double kReferenceCotangent = 4.0 / 3.0;
 constexpr double kMaxLogOdds = 30.0;
-constexpr double kMaxCn0_dbhz = 70.0;  // beyond it, an invention of a driver
 
 double elevation_factor(double elevation_rad, const NlosParameters& p) {
   // Lower down, the length of the walls bounds the way.
@@ -46,9 +45,7 @@ double levelled_cn0_dbhz(const SatelliteObservation& satellite, const NlosParame
   return satellite.cn0_dbhz - cn0_gain_db(satellite.look.elevation_rad, p);
 }
 
-double nlos_log_odds(double cn0_dbhz, double even_cn0_dbhz, const NlosParameters& p) {
-  return (even_cn0_dbhz - std::min(cn0_dbhz, kMaxCn0_dbhz)) / p.cn0_width;
-}
+double nlos_log_odds(double below_even_db, const NlosParameters& p) { return below_even_db / p.cn0_width; }
 
 double log_odds(double probability) { return std::log(probability / (1.0 - probability)); }
 

@@ -42,8 +42,8 @@ std::vector<SatelliteRange> ranges_of(const std::vector<SatelliteObservation>& s
     const SatelliteObservation& each = *observation;
     const Constellation clock = clock_of(id.constellation);
     if (sharing[clock] < 2) continue;  // alone, it only tells its clock
-    const double nlos =
-        probability_of(nlos_log_odds(levelled_cn0_dbhz(each, p.nlos), nominal_cn0_dbhz - p.nlos_cn0_drop, p.nlos));
+    const double weaker_db = nominal_cn0_dbhz - levelled_cn0_dbhz(each, p.nlos);
+    const double nlos = probability_of(nlos_log_odds(weaker_db - p.nlos_cn0_drop, p.nlos));
     ranges.push_back({clock, line_of_sight(each.look), each.residual_m,
                       std::clamp(nlos, 1.0 - kMostCertain, kMostCertain), nlos_range(each.look.elevation_rad, p.nlos)});
   }

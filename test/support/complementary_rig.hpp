@@ -64,7 +64,8 @@ struct Drive {
     if (is_standstill(measured)) return;
     MotionNoise noise;
     noise.speed = draw_normal(engine);
-    noise.input = draw_normal(engine);
+    // A share of the yaw rate, with its sign.
+    noise.input = std::copysign(1.0, measured.yaw_rate_radps) * draw_normal(engine);
     truth = move_noisily(truth, make_motion_step(measured, dt, parameters.motion, p), noise, errors);
     truth.x += p.position_walk * std::sqrt(dt) * draw_normal(engine);
     truth.y += p.position_walk * std::sqrt(dt) * draw_normal(engine);

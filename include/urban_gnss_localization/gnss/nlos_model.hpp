@@ -54,9 +54,8 @@ double cn0_gain_db(double elevation_rad, const NlosParameters& parameters);
 /// C/N0 (dB-Hz) that the signal would have at 37 degrees elevation.
 double levelled_cn0_dbhz(const SatelliteObservation& satellite, const NlosParameters& parameters);
 
-/// Log-odds of an NLOS signal against one in line of sight by its C/N0, where the odds are even at `even_cn0_dbhz`;
-/// both at the same elevation.
-double nlos_log_odds(double cn0_dbhz, double even_cn0_dbhz, const NlosParameters& parameters);
+/// Log-odds of an NLOS signal against one in line of sight, whose C/N0 is so far below that of even odds (dB).
+double nlos_log_odds(double below_even_db, const NlosParameters& parameters);
 
 double log_odds(double probability);
 /// The inverse, strictly between 0 and 1 for log-odds of any size.
