@@ -38,7 +38,7 @@ DeadReckoningStep dead_reckon(const Pose2& pose, const OdometryErrors& errors, c
   DeadReckoningStep step;
   step.noise.setZero();
   step.yaw_rate_scale.setZero();
-  if (is_standstill(motion.twist)) {
+  if (is_standstill(motion.twist, p.standstill_radps)) {
     step.pose = pose;
     step.transition.setIdentity();
     step.noise(0, 0) = step.noise(1, 1) = square(p.parked_walk) * dt;

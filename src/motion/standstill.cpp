@@ -4,8 +4,8 @@
 
 namespace urban_gnss {
 
-bool is_standstill(const Twist2& twist) {
-  return std::abs(twist.speed_mps) < kStandstill_mps && std::abs(twist.yaw_rate_radps) < kStandstill_radps;
+bool is_standstill(const Twist2& twist, double yaw_rate_limit_radps) {
+  return std::abs(twist.speed_mps) < kStandstill_mps && std::abs(twist.yaw_rate_radps) < yaw_rate_limit_radps;
 }
 
 void Travel::add(const Twist2& twist, double step_s) {

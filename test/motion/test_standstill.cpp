@@ -11,6 +11,7 @@ TEST(Standstill, IsOfTheWheelsWhateverTheGyroscopeDrifts) {
   EXPECT_TRUE(is_standstill({0.0009, -0.009}));
   EXPECT_FALSE(is_standstill({0.0, 0.011}));  // turns on the spot
   EXPECT_FALSE(is_standstill({-0.0011, 0.0}));
+  EXPECT_FALSE(is_standstill({0.0, 0.009}, 1e-4));
 }
 
 TEST(Standstill, OfATravelIsThatOfItsMeanSpeed) {

@@ -61,7 +61,7 @@ struct Drive {
     time_s += dt;
     const Twist2 measured{speed_mps, speed_mps > 0.0 ? 0.2 * std::sin(0.1 * time_s) : 0.0};
     filter.move(measured, dt);
-    if (is_standstill(measured)) return;
+    if (is_standstill(measured, 1e-4)) return;
     MotionNoise noise;
     noise.speed = draw_normal(engine);
     // A share of the yaw rate, with its sign.

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "urban_gnss_localization/motion/motion_model.hpp"
+#include "urban_gnss_localization/motion/standstill.hpp"
 
 namespace urban_gnss {
 
@@ -15,6 +16,7 @@ struct OdometryErrorParameters {
   double position_walk{0.1};
   double heading_walk{0.002};
   double parked_walk{0.03};
+  double standstill_radps{kStandstill_radps};  ///< not told by users: the yaw rate at which the method's robot stands
 
   void visit(ParameterVisitor& v) {
     v("motion_noise_factor", motion_noise_factor, non_negative(), "",

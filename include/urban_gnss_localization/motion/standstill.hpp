@@ -12,8 +12,9 @@ inline constexpr double kStandstill_radps = 0.01;
 /// adds up to some centimetres a second, and who creeps more slowly meets the same reflections.
 inline constexpr double kStandstillMean_mps = 0.05;
 
-/// Whether the robot stands during a step of odometry, which then has no error, neither noise nor bias.
-bool is_standstill(const Twist2& twist);
+/// Whether the robot stands during a step of odometry, which then has no error, neither noise nor bias. A method whose
+/// yaw rate is the wheels' may be stricter than `yaw_rate_limit_radps` is by default.
+bool is_standstill(const Twist2& twist, double yaw_rate_limit_radps = kStandstill_radps);
 
 /// What the odometry says of the time since some event, such as the last fix.
 struct Travel {

@@ -64,7 +64,7 @@ void Ukf::initialize(const PoseEstimate& start) {
 
 void Ukf::move(const Twist2& twist, double duration_s) {
   if (!is_usable(twist, duration_s)) return;
-  if (is_standstill(twist)) {
+  if (is_standstill(twist, parameters_.odometry.standstill_radps)) {
     Covariance covariance = covariance_;
     const double walk = parameters_.odometry.parked_walk;
     covariance.diagonal().head<2>().array() += walk * walk * duration_s;
