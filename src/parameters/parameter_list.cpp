@@ -1,6 +1,7 @@
 #include "urban_gnss_localization/parameters/parameter_list.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <ostream>
@@ -13,17 +14,16 @@ constexpr std::size_t kLongestLine = 120;
 
 /// The shortest text that reads as the same number, and as a floating-point one in YAML 1.1 (1.0e-05, not 1e-05).
 std::string text_of(double value) {
-  char buffer[32];
+  constexpr double kLeastWithoutExponent = 1e-4;
+  constexpr double kMostWithoutExponent = 1e7;
+  char buffer[64];
+  const double size = std::abs(value);
+  const bool is_plain = value == 0.0 || (size >= kLeastWithoutExponent && size < kMostWithoutExponent);
   for (int digits = 1; digits <= 17; ++digits) {
-    std::snprintf(buffer, sizeof(buffer), "%.*g", digits, value);
+    std::snprintf(buffer, sizeof(buffer), is_plain ? "%.*f" : "%.*e", digits, value);
     if (std::strtod(buffer, nullptr) == value) break;
   }
-  std::string text = buffer;
-  if (text.find('.') == std::string::npos) {
-    const auto exponent = text.find('e');
-    text.insert(exponent == std::string::npos ? text.size() : exponent, ".0");
-  }
-  return text;
+  return buffer;
 }
 
 std::string joined(const std::vector<std::string>& names) {

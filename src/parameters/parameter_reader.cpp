@@ -3,11 +3,32 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 namespace urban_gnss {
 namespace {
 
 constexpr const char* kExpert = "expert";
+
+/// Names that parameters had once, and those that they have.
+constexpr std::pair<const char*, const char*> kFormerNames[] = {
+    {"odom_scale_sigma", "speed_scale_sigma"},
+    {"odom_scale_walk", "speed_scale_walk"},
+    {"odom_yaw_bias_sigma", "yaw_rate_bias_sigma"},
+    {"odom_yaw_bias_walk", "yaw_rate_bias_walk"},
+    {"odom_position_noise", "position_walk"},
+    {"odom_heading_noise", "heading_walk"},
+    {"odom_speed_noise", "odom_alpha1"},     // of which it was the root
+    {"odom_yaw_rate_noise", "odom_alpha4"},  // likewise
+    {"reflected_range", "nlos_mean"},
+    {"reflected_range_sigma", "nlos_sigma"},
+    {"reflected_elevation_exponent", "nlos_elevation_exponent"},
+    {"weak_cn0_drop", "nlos_cn0_drop"},
+    {"weak_cn0_width", "nlos_cn0_width"},
+    {"antenna_cn0_rise", "nlos_cn0_rise"},
+    {"satellites_timeout", "satellites_wait"},
+    {"satellites_timeout", "satellites_max_age"},
+};
 
 std::size_t edit_distance(const std::string& a, const std::string& b) {
   std::vector<std::size_t> row(b.size() + 1);
@@ -134,8 +155,7 @@ void ParameterReader::on_boolean(const ParameterKey& key, bool& value) { convert
 
 void ParameterReader::on_text(const ParameterKey& key, std::string& value) { convert(key, value, "a text"); }
 
-void ParameterReader::on_choice(const ParameterKey& key, std::size_t& chosen,
-                                const std::vector<const char*>& choices) {
+void ParameterReader::on_choice(const ParameterKey& key, std::size_t& chosen, const std::vector<const char*>& choices) {
   const YAML::Node node = find(key);
   if (!node.IsDefined()) return;
   std::string all;
@@ -174,12 +194,14 @@ std::string ParameterReader::hint(const std::string& path) const {
   const std::string name = last_name(path);
   for (const std::string& known : known_) {
     if (last_name(known) == name) return "; it is " + prefix_ + known;
+    for (const auto& [former, now] : kFormerNames) {
+      if (name == former && last_name(known) == now) return "; it is now " + prefix_ + known;
+    }
   }
   const auto nearest = std::min_element(known_.begin(), known_.end(), [&](const auto& a, const auto& b) {
     return edit_distance(name, last_name(a)) < edit_distance(name, last_name(b));
   });
-  const bool is_near =
-      nearest != known_.end() && edit_distance(name, last_name(*nearest)) <= 1 + name.size() / 3;
+  const bool is_near = nearest != known_.end() && edit_distance(name, last_name(*nearest)) <= 1 + name.size() / 3;
   return is_near ? "; did you mean " + prefix_ + *nearest + "?" : "";
 }
 

@@ -2,18 +2,15 @@
 
 #include "urban_gnss_localization/experiments/paper_experiment.hpp"
 
-#include <ros/package.h>
 #include <sys/utsname.h>
 
 #include <array>
-#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <iomanip>
 #include <iostream>
-#include <mutex>
 #include <nlohmann/json.hpp>
 #include <sstream>
 #include <thread>
@@ -21,7 +18,7 @@
 #include "command_line.hpp"
 #include "find_scenario.hpp"
 #include "output_file.hpp"
-#include "urban_gnss_localization/common/progress.hpp"
+#include "parallel_jobs.hpp"
 #include "urban_gnss_localization/evaluation/report_json.hpp"
 #include "urban_gnss_localization/evaluation/statistics.hpp"
 #include "urban_gnss_localization/parameters/assignment.hpp"
@@ -260,52 +257,29 @@ std::string machine() {
          std::to_string(std::thread::hardware_concurrency()) + " threads";
 }
 
-void run_all(const Options& options, const std::string& command) {
-  const PaperExperimentConditions conditions = load_conditions(options);
-  const std::vector<PaperMethod> methods = select_methods(options.methods);
-  const fs::path data = fs::path(options.plots) / "data";
-  if (!options.plots.empty()) fs::create_directories(data);
+using Results = std::vector<std::vector<RunErrors>>;  ///< by method and seed
 
-  const std::size_t seeds = static_cast<std::size_t>(options.seeds);
-  const std::size_t total = methods.size() * seeds;
-  std::vector<std::vector<RunErrors>> results(methods.size(), std::vector<RunErrors>(seeds));
-  std::atomic<std::size_t> next{0};
-  std::size_t done = 0;
-  Progress progress(total, "runs");
-  std::mutex terminal;
-  std::exception_ptr failure;
-  const auto work = [&] {
-    for (std::size_t job = next++; job < total; job = next++) {
-      const std::size_t m = job / seeds;
-      const std::size_t s = job % seeds;
-      try {
+/// Every method on every seed; a method's first run leaves its trace in `data` where there are to be plots.
+Results run_methods(const Options& options, const PaperExperimentConditions& conditions,
+                    const std::vector<PaperMethod>& methods, const fs::path& data) {
+  const auto seeds = static_cast<std::size_t>(options.seeds);
+  Results results(methods.size(), std::vector<RunErrors>(seeds));
+  run_jobs(
+      methods.size() * seeds, options.jobs, [&](std::size_t job) { return methods[job / seeds].name; },
+      [&](std::size_t job, const std::function<void(double)>& on_progress) {
+        const std::size_t m = job / seeds;
+        const std::size_t s = job % seeds;
         std::unique_ptr<TraceWriter> trace;
         if (s == 0 && !options.plots.empty()) {
           trace = std::make_unique<TraceWriter>(data, methods[m].name, options.laps - 1);
         }
         results[m][s] = run(methods[m], conditions, options.first_seed + static_cast<int>(s), trace.get());
-      } catch (...) {
-        const std::lock_guard<std::mutex> lock(terminal);
-        failure = std::current_exception();
-      }
-      const std::lock_guard<std::mutex> lock(terminal);
-      progress.report(++done, methods[m].name);
-    }
-  };
-  const auto start = std::chrono::steady_clock::now();
-  std::vector<std::thread> threads;
-  for (int i = 0; i < options.jobs; ++i) threads.emplace_back(work);
-  for (std::thread& thread : threads) thread.join();
-  progress.finish();
-  if (failure) std::rethrow_exception(failure);
+        on_progress(1.0);
+      });
+  return results;
+}
 
-  nlohmann::json metrics;
-  metrics["command"] = command;
-  metrics["machine"] = machine();
-  metrics["wall_s"] = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  metrics["closed_loop"] = conditions.closed_loop;
-  metrics["laps"] = options.laps;
-  for (std::size_t s = 0; s < seeds; ++s) metrics["seeds"].push_back(options.first_seed + static_cast<int>(s));
+nlohmann::json conditions_json(const PaperExperimentConditions& conditions) {
   const auto texts = [](const ParameterList& list) {
     nlohmann::json json;
     for (const ListedParameter& each : list.parameters()) {
@@ -313,24 +287,16 @@ void run_all(const Options& options, const std::string& command) {
     }
     return json;
   };
-  metrics["conditions"] = {
+  return {
       {"simulator", texts(ParameterList().add(conditions.field).add(conditions.field_motion))},
       {"particle_filter", texts(ParameterList().add(conditions.filter).add(conditions.filter_motion))},
       {"switching_particle_filter", texts(ParameterList().add(conditions.switching).add(conditions.switching_motion))},
       {"gps_bias", texts(ParameterList().add(conditions.bias))},
       {"waypoint_controller", texts(ParameterList().add(conditions.controller))}};
-  for (std::size_t m = 0; m < methods.size(); ++m) {
-    metrics["method_order"].push_back(methods[m].name);
-    metrics["methods"][methods[m].name] = method_json(methods[m], results[m]);
-  }
-  print_table(metrics);
+}
 
-  const auto write_json = [&](const fs::path& file) {
-    write_file(file, [&](std::ostream& out) { out << metrics.dump(2) << '\n'; });
-  };
-  if (!options.json_file.empty()) write_json(options.json_file);
-  if (options.plots.empty()) return;
-  write_json(fs::path(options.plots) / "metrics.json");
+void write_plots(const Options& options, const PaperExperimentConditions& conditions,
+                 const std::vector<PaperMethod>& methods, const Results& results, const fs::path& data) {
   write_file(data / "targets.csv", [&](std::ostream& out) {
     out << "x,y\n";
     for (const auto& target : conditions.controller.target_points()) out << target.x() << ',' << target.y() << '\n';
@@ -340,6 +306,36 @@ void run_all(const Options& options, const std::string& command) {
                [&](std::ostream& out) { write_curves(out, results[m], conditions.field.interval); });
   }
   run_plotter("plot_paper_experiment.py", options.plots);
+}
+
+void run_all(const Options& options, const std::string& command) {
+  const PaperExperimentConditions conditions = load_conditions(options);
+  const std::vector<PaperMethod> methods = select_methods(options.methods);
+  const fs::path data = fs::path(options.plots) / "data";
+  if (!options.plots.empty()) fs::create_directories(data);
+  const auto start = std::chrono::steady_clock::now();
+  const Results results = run_methods(options, conditions, methods, data);
+
+  nlohmann::json metrics;
+  metrics["command"] = command;
+  metrics["machine"] = machine();
+  metrics["wall_s"] = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  metrics["closed_loop"] = conditions.closed_loop;
+  metrics["laps"] = options.laps;
+  for (int s = 0; s < options.seeds; ++s) metrics["seeds"].push_back(options.first_seed + s);
+  metrics["conditions"] = conditions_json(conditions);
+  for (std::size_t m = 0; m < methods.size(); ++m) {
+    metrics["method_order"].push_back(methods[m].name);
+    metrics["methods"][methods[m].name] = method_json(methods[m], results[m]);
+  }
+  print_table(metrics);
+  const auto write_json = [&](const fs::path& file) {
+    write_file(file, [&](std::ostream& out) { out << metrics.dump(2) << '\n'; });
+  };
+  if (!options.json_file.empty()) write_json(options.json_file);
+  if (options.plots.empty()) return;
+  write_json(fs::path(options.plots) / "metrics.json");
+  write_plots(options, conditions, methods, results, data);
 }
 
 }  // namespace

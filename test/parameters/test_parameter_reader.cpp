@@ -5,9 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "urban_gnss_localization/parameters/parameter_reader.hpp"
-
 #include "urban_gnss_localization/parameters/parameter_list.hpp"
+#include "urban_gnss_localization/parameters/parameter_reader.hpp"
 
 namespace urban_gnss {
 namespace {
@@ -275,6 +274,16 @@ TEST(TieredParameters, FlatNameIsRefusedWithTheNewPlace) {
             "a.yaml:1: expert.height_m: no such parameter; it is height_m");
   EXPECT_EQ(faults_in_tiers("expert: {robot: {mas_kg: 4}}").at(0),
             "a.yaml:1: expert.robot.mas_kg: no such parameter; did you mean expert.robot.mass_kg?");
+}
+
+TEST(TieredParameters, FormerNameIsRefusedWithTheNewOne) {
+  struct Odometry {
+    double speed_scale_sigma{0.02};
+    void visit(ParameterVisitor& v) { v("speed_scale_sigma", speed_scale_sigma, non_negative(), "", "of the wheels"); }
+  } odometry;
+  ParameterReader reader(YAML::Load("odom_scale_sigma: 0.1"), "", "", Layout::kTiered);
+  EXPECT_EQ(reader.read(odometry).finish().at(0),
+            "odom_scale_sigma: no such parameter; it is now expert.speed_scale_sigma");
 }
 
 TEST(TieredParameters, FaultsNameThePlace) {
