@@ -95,8 +95,7 @@ std::vector<Page> all_pages(const LocalizerRegistry& localizers) {
     document(name + "_node", summary, list);
   };
   node("gps_bias",
-       "The bias filter of Nishida et al., in front of particle_filter. What it shares with the localizer has the same "
-       "name and place.",
+       "The bias filter of Nishida et al. What it shares with the localizer has the same name and place there.",
        ParameterList().add(GpsBiasNodeParameters()));
   node("occlusion", "Covariances of fixes by ray traces to the satellites, Maier and Kleiner.",
        ParameterList().add(OcclusionNodeSettings()));

@@ -151,8 +151,8 @@ TEST(ParticleFilter, ParkedRobotWithGoodFixesStaysWhereItIs) {
 /// Root mean square error over 20 s in a shadow whose bias grows to 4 m along x in 4 s and stays; its length is known.
 double error_in_shadow(const std::string& mode, std::uint64_t seed) {
   ParticleFilterParameters parameters = with(ParticleFilterParameters{}, mode);
-  parameters.model.fix.direct_sigma = 0.1;
-  parameters.model.fix.shadow_sigma = 0.3;
+  parameters.fix.direct_sigma = 0.1;
+  parameters.fix.shadow_sigma = 0.3;
   parameters.cluster_cell = 0.5;
   parameters.seed = static_cast<int>(seed);
   MotionParameters motion;

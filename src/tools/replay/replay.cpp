@@ -12,9 +12,9 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "../bag_messages.hpp"
-#include "../command_line.hpp"
-#include "../output_file.hpp"
+#include "bag_messages.hpp"
+#include "command_line.hpp"
+#include "output_file.hpp"
 #include "replay_settings.hpp"
 #include "urban_gnss_localization/common/progress.hpp"
 #include "urban_gnss_localization/evaluation/report_json.hpp"

@@ -1,7 +1,7 @@
 // The program replay with one localizer more: what a new localizer needs is its own folder, here this file, and one
 // line of the registry, here the call of add().
 
-#include "../../../src/tools/replay/replay.hpp"
+#include "replay.hpp"
 
 namespace urban_gnss {
 namespace {
