@@ -56,10 +56,10 @@ struct ParameterKey {
 /// Goes through a struct of parameters: to read it, to write it, to check it, to document it.
 ///
 /// A parameter struct lists its fields once, in `void visit(ParameterVisitor& v)`:
-///   v("gate_timeout", gate_timeout, positive(), "s", "of nothing but rejections after which the filter starts anew");
-///   v("mode", mode, "which filter");                                          // enumeration, bool or text
+///   v("gate_timeout", gate_timeout, positive(), "s", "time with nothing but rejected fixes after which it restarts");
+///   v("mode", mode, "variant of the filter");                                 // enumeration, bool or text
 ///   v.basic()("datum", datum, "deg, deg, m", "origin of the map frame");      // tier one; a list of numbers
-///   v.group("noise", noise, "what a receiver's covariance is worth");         // a struct below a name of its own
+///   v.group("noise", noise, "Noise of the fixes.");                           // a struct below a name of its own
 ///   v.include(motion);                                                        // a struct beside the fields
 /// and its conditions between fields in `void check(std::vector<std::string>& faults) const`, where it has any; a fault
 /// begins with the field's name. Ranges and conditions of all structs within are checked by whoever visits.

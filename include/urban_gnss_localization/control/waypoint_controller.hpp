@@ -17,16 +17,16 @@ struct WaypointControllerParameters {
   std::vector<double> targets;
 
   void visit(ParameterVisitor& v) {
-    v.basic()("speed", speed, positive(), "m/s", "v, constant, eq. (37)");
+    v.basic()("speed", speed, positive(), "m/s", "constant speed v, eq. (37)");
     v.basic()("steering_gain", steering_gain, positive(), "",
-      "k_phi, eq. (36): steering angle per angle from heading to bearing, eq. (38)");
+              "steering gain k_phi, eq. (36): steering angle per angle from heading to bearing, eq. (38)");
     v.basic()("max_steering", max_steering, open_between(0.0, 1.5), "rad", "limit of the steering angle");
-    v.basic()("wheelbase", wheelbase, positive(), "m", "l of eq. (4): turns the steering angle into the yaw rate of cmd_vel");
+    v.basic()("wheelbase", wheelbase, positive(), "m",
+              "wheelbase l, eq. (4), which turns the steering angle into the yaw rate of cmd_vel");
     v.basic()("switch_distance", switch_distance, positive(), "m",
-      "between estimate and target, at which the next target becomes current");
-    v.basic()("laps", laps, non_negative(), "", "rounds after which it stops; 0: never");
-    v.basic()("targets", targets, "m",
-              "x1, y1, x2, y2, ... in the map frame; empty: the robot stands");
+              "distance from estimate to target at which the next target becomes current");
+    v.basic()("laps", laps, non_negative(), "", "number of laps after which the robot stops; 0: never");
+    v.basic()("targets", targets, "m", "targets x1, y1, x2, y2, ... in the map frame; empty: the robot stands");
   }
   void check(std::vector<std::string>& faults) const;
 

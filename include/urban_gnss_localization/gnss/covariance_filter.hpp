@@ -18,11 +18,13 @@ struct CovarianceFilterParameters {
   double smooth_length_max{12.0};
 
   void visit(ParameterVisitor& v) {
-    v("sigma_infinite", sigma_infinite, positive(), "m per axis", "of a fix without weight");
-    v("sigma_threshold", sigma_threshold, positive(), "m", "a fix above it is bad");
-    v("sigma_smooth", sigma_smooth, positive(), "m", "fixes above it leave a receiver that must recover");
-    v("smooth_length_scale", smooth_length_scale, non_negative(), "", "fixes of recovery for each such fix");
-    v("smooth_length_max", smooth_length_max, between(0.0, 1e6), "", "fixes of recovery at most");
+    v("sigma_infinite", sigma_infinite, positive(), "m per axis", "standard deviation of a fix without weight");
+    v("sigma_threshold", sigma_threshold, positive(), "m", "root of the covariance's trace above which a fix is bad");
+    v("sigma_smooth", sigma_smooth, positive(), "m",
+      "root of the covariance's trace above which a fix is followed by a recovery of the receiver");
+    v("smooth_length_scale", smooth_length_scale, non_negative(), "",
+      "number of fixes of recovery for each fix above sigma_smooth");
+    v("smooth_length_max", smooth_length_max, between(0.0, 1e6), "", "greatest number of fixes of recovery");
   }
   void check(std::vector<std::string>& faults) const;
 

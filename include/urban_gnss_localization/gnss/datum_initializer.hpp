@@ -19,8 +19,9 @@ struct DatumParameters {
   void visit(ParameterVisitor& v) {
     v.basic()("datum", datum, "deg, deg, m",
               "latitude, longitude and altitude of the map frame's origin; empty: gps/datum or the first fixes");
-    v("datum_fix_count", datum_fix_count, between(1, 1000), "", "of fixes that must agree on it");
-    v("datum_max_spread", datum_max_spread, positive(), "m", "farthest that one of these may lie from their median");
+    v("datum_fix_count", datum_fix_count, between(1, 1000), "", "number of fixes that must agree on the datum");
+    v("datum_max_spread", datum_max_spread, positive(), "m",
+      "greatest distance of an agreeing fix from the median of the fixes");
   }
   void check(std::vector<std::string>& faults) const;
 };

@@ -13,10 +13,12 @@ struct FixSigmaParameters {
   double shadow_sigma{3.0};
 
   void visit(ParameterVisitor& v) {
-    v.basic()("use_fix_covariance", use_fix_covariance, "each fix's own covariance in place of direct_sigma");
-    v.basic()("direct_sigma", direct_sigma, positive(), "m", "noise of a fix in direct reception");
+    v.basic()("use_fix_covariance", use_fix_covariance,
+              "whether each fix's own covariance is used in place of direct_sigma");
+    v.basic()("direct_sigma", direct_sigma, positive(), "m", "standard deviation of a fix in direct reception");
     v("shadow_sigma", shadow_sigma, positive(), "m",
-      "noise of a fix about its bias; over direct_sigma: factor on each fix's own");
+      "standard deviation of a fix about its bias; with use_fix_covariance, its ratio to direct_sigma scales each "
+      "fix's own");
   }
 
   /// Covariance (m^2) of a fix that declares `declared`, in direct reception.

@@ -20,13 +20,16 @@ struct FixValidationParameters {
   double max_distance_from_datum{100000.0};
 
   void visit(ParameterVisitor& v) {
-    v.basic()("fix_sigma_default", fix_sigma_default, positive(), "",
-              "m per axis where a fix declares no covariance that can be used");
-    v("fix_sigma_floor", fix_sigma_floor, positive(), "m per axis", "least that is believed");
-    v("fix_sigma_ceiling", fix_sigma_ceiling, positive(), "m per axis", "most that is kept");
+    v.basic()("fix_sigma_default", fix_sigma_default, positive(), "m per axis",
+              "standard deviation of a fix that declares no usable covariance");
+    v("fix_sigma_floor", fix_sigma_floor, positive(), "m per axis",
+      "least standard deviation of a fix; smaller declared ones are raised to it");
+    v("fix_sigma_ceiling", fix_sigma_ceiling, positive(), "m per axis",
+      "greatest standard deviation of a fix; larger declared ones are lowered to it");
     v("fix_covariance_scale", fix_covariance_scale, positive(), "",
       "factor on the declared covariance (a variance), before floor and ceiling");
-    v("max_distance_from_datum", max_distance_from_datum, positive(), "m", "a fix farther away is rejected");
+    v("max_distance_from_datum", max_distance_from_datum, positive(), "m",
+      "distance from the datum beyond which a fix is rejected");
   }
   void check(std::vector<std::string>& faults) const;
 };

@@ -55,26 +55,32 @@ struct GnssCovarianceParameters {
   CovarianceFilterParameters filter;
 
   void visit(ParameterVisitor& v) {
-    v.basic()("model", model, "soft, paper: eq. (6) and Algorithm 3, or conventional: eq. (4)");
+    v.basic()("model", model,
+              "covariance model; soft: by NLOS probabilities; paper: eq. (6) and Algorithm 3; conventional: eq. (4)");
     v.basic()("sigma_ure", sigma_ure, positive(), "m", "standard deviation of a range in line of sight");
     v("blocked_threshold", blocked_threshold, open_between(0.0, 1.0), "",
-      "paper: a satellite with so large a share of blocked rays is not visible");
-    v("allow_smaller", allow_smaller, "whether the result may be below the receiver's own covariance");
-    v("assumed_hdop", assumed_hdop, positive(), "", "where neither the receiver nor satellites tell");
-    v("receiver_weighting", receiver_weighting, "soft: how the receiver is taken to weigh its ranges, equal or cn0");
-    v("weight_cn0", weight_cn0, between(0.0, 70.0), "dB-Hz", "from here on it weighs ranges equally");
-    v("weight_floor", weight_floor, between(1e-6, 1.0), "", "its least weight of a range, of 1");
-    v.group("nlos", nlos, "The excess range of an NLOS signal.");
+      "share of blocked rays at which a satellite counts as not visible (paper)");
+    v("allow_smaller", allow_smaller, "whether the result may be smaller than the receiver's own covariance");
+    v("assumed_hdop", assumed_hdop, positive(), "", "HDOP assumed where neither receiver nor satellites provide one");
+    v("receiver_weighting", receiver_weighting,
+      "weighting of the ranges assumed of the receiver: equal, or by C/N0 (soft)");
+    v("weight_cn0", weight_cn0, between(0.0, 70.0), "dB-Hz",
+      "C/N0 above which the receiver is assumed to weight ranges equally");
+    v("weight_floor", weight_floor, between(1e-6, 1.0), "",
+      "least relative weight that the receiver is assumed to give to a range");
+    v.group("nlos", nlos, "Excess range of an NLOS signal.");
     v("nlos_hidden_exponent", nlos_hidden_exponent, between(0.0, 5.0), "",
-      "excess ranges grow with this power of the hidden share of the satellites in view");
+      "exponent of the hidden share of the satellites in view in the factor on excess ranges; 0: no effect");
     v("nlos_cn0", nlos_cn0, between(0.0, 70.0), "dB-Hz",
-      "at which a signal at 37 degrees elevation is as likely NLOS as not");
+      "C/N0 at which a signal at 37 degrees elevation is as likely NLOS as in line of sight");
     v("nlos_if_blocked", nlos_if_blocked, between(0.001, 0.999), "",
-      "probability of no line of sight where the map blocks it");
-    v("nlos_if_free", nlos_if_free, between(0.001, 0.999), "", "where the map shows free space");
-    v("nlos_if_unknown", nlos_if_unknown, between(0.001, 0.999), "", "where the map shows nothing");
-    v.group("smoothing", smoothing, "How the receiver smooths its solutions.");
-    v.group("filter", filter, "paper: the filter of the covariance, Algorithm 3.");
+      "probability of no line of sight where the map shows an obstruction");
+    v("nlos_if_free", nlos_if_free, between(0.001, 0.999), "",
+      "probability of no line of sight where the map shows free space");
+    v("nlos_if_unknown", nlos_if_unknown, between(0.001, 0.999), "",
+      "probability of no line of sight where the map shows nothing");
+    v.group("smoothing", smoothing, "Smoothing of solutions by the receiver.");
+    v.group("filter", filter, "Filter of the covariance, Algorithm 3 (paper).");
   }
   void check(std::vector<std::string>& faults) const;
 };

@@ -20,10 +20,11 @@ struct HeadingInitializerParameters {
 
   void visit(ParameterVisitor& v) {
     v("initialization_heading_sigma", initialization_heading_sigma, open_between(0.0, 1.0), "rad",
-      "start from motion once the heading is known this well");
+      "standard deviation of the heading below which the localizer starts from motion");
     v("initialization_timeout", initialization_timeout, positive(), "s",
-      "after the first fix at which it starts without a heading");
-    v("initialization_window", initialization_window, positive(), "s", "of fixes that the start is found from");
+      "time after the first fix at which the localizer starts without a heading");
+    v("initialization_window", initialization_window, positive(), "s",
+      "length of the window of fixes from which the start is found");
   }
   void check(std::vector<std::string>& faults) const;
 };

@@ -29,13 +29,16 @@ struct NlosParameters {
 
   void visit(ParameterVisitor& v) {
     v("nlos_mean", mean, non_negative(), "m", "mean excess range of an NLOS signal at 37 degrees elevation");
-    v("nlos_sigma", sigma, positive(), "m", "standard deviation of the excess range at 37 degrees elevation");
-    v("nlos_elevation_law", elevation_law, "by which both grow with a falling elevation: cotangent or cosecant");
+    v("nlos_sigma", sigma, positive(), "m",
+      "standard deviation of the excess range of an NLOS signal at 37 degrees elevation");
+    v("nlos_elevation_law", elevation_law,
+      "law by which mean and standard deviation of the excess range grow towards low elevations");
     v("nlos_elevation_exponent", elevation_exponent, between(0.0, 5.0), "",
-      "exponent of that law; 0: they do not grow");
-    v("nlos_cn0_width", cn0_width, positive(), "dB", "of C/N0 that change the odds of an NLOS signal by e");
+      "exponent of nlos_elevation_law; 0: no growth");
+    v("nlos_cn0_width", cn0_width, positive(), "dB",
+      "change of C/N0 that changes the odds of an NLOS signal by a factor of e");
     v("nlos_cn0_rise", cn0_rise, between(-30.0, 30.0), "dB",
-      "by which the C/N0 of even odds rises from the horizon to the zenith");
+      "rise, from horizon to zenith, of the C/N0 at which a signal is as likely NLOS as in line of sight");
   }
 };
 

@@ -25,19 +25,23 @@ struct RangeFixParameters {
   double range_bias_odds{0.03};
 
   void visit(ParameterVisitor& v) {
-    v("use_ranges", use_ranges, "the ranges of a fix in place of the fix, where gps/satellites has their residuals");
+    v("use_ranges", use_ranges,
+      "whether a fix is solved anew from its ranges where gps/satellites has their residuals");
     v("range_sigma", range_sigma, positive(), "m",
-      "of a range in line of sight, before anything is learnt: noise, multipath, orbits");
-    v("range_sigma_min", range_sigma_min, positive(), "m", "the least that it can be learnt to be");
-    v("range_sigma_max", range_sigma_max, positive(), "m", "and the most: larger errors are those of reflections");
-    v.group("nlos", nlos, "The excess range of an NLOS signal.");
-    v("nlos_cn0_drop", nlos_cn0_drop, between(0.0, 50.0), "",
-      "dB below the nominal C/N0 at which a signal is as likely NLOS as not");
-    v("range_height_sigma", range_height_sigma, positive(), "m", "of the receiver's own height");
+      "initial standard deviation of a range in line of sight (noise, multipath, orbits)");
+    v("range_sigma_min", range_sigma_min, positive(), "m",
+      "least standard deviation that is learnt for a range in line of sight");
+    v("range_sigma_max", range_sigma_max, positive(), "m",
+      "greatest standard deviation that is learnt for a range in line of sight; larger errors are those of "
+      "reflections");
+    v.group("nlos", nlos, "Excess range of an NLOS signal.");
+    v("nlos_cn0_drop", nlos_cn0_drop, between(0.0, 50.0), "dB",
+      "drop of C/N0 below its nominal value at which a signal is as likely NLOS as in line of sight");
+    v("range_height_sigma", range_height_sigma, positive(), "m", "standard deviation of the receiver's own height");
     v("range_correlation_time", range_correlation_time, non_negative(), "s",
-      "over which the error of ranges stays the same; 0: independent errors");
+      "correlation time of the errors of ranges; 0: independent errors");
     v("range_bias_odds", range_bias_odds, positive(), "",
-      "factor on the odds of a bias of a fix whose ranges are known");
+      "factor on the odds of a bias in a fix whose ranges are known");
   }
   void check(std::vector<std::string>& faults) const {
     if (!(range_sigma_min <= range_sigma && range_sigma <= range_sigma_max)) {

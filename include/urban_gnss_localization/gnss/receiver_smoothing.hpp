@@ -16,9 +16,9 @@ struct ReceiverSmoothingParameters {
 
   void visit(ParameterVisitor& v) {
     v("receiver_smoothing_time", receiver_smoothing_time, non_negative(), "s",
-      "over which the receiver smooths: so long an error outlasts its cause");
+      "time constant of the receiver's smoothing, for which an error outlasts its cause");
     v("receiver_coasting_time", receiver_coasting_time, non_negative(), "s",
-      "without a solution after which it starts anew");
+      "time without a solution after which the receiver's smoothing starts anew");
   }
 };
 

@@ -55,21 +55,23 @@ struct MotionParameters {
   double odom_noise_interval{1.0};
 
   void visit(ParameterVisitor& v) {
-    v("motion_model", motion_model, "noise on speed and yaw rate (velocity), or on speed and steering angle (bicycle)");
-    v("wheelbase", wheelbase, positive(), "m", "l of eq. (4), for bicycle");
-    v("odom_alpha1", odom_alpha1, non_negative(), "", "variance of the speed, (m/s)^2 per (m/s)^2 of speed, eq. (5)");
+    v("motion_model", motion_model,
+      "inputs with noise: speed and yaw rate (velocity), or speed and steering angle (bicycle)");
+    v("wheelbase", wheelbase, positive(), "m", "wheelbase l of the bicycle model, eq. (4)");
+    v("odom_alpha1", odom_alpha1, non_negative(), "", "variance of the speed per squared speed, eq. (5)");
     v("odom_alpha2", odom_alpha2, non_negative(), "",
       "variance of the speed per squared yaw rate (velocity) or steering angle (bicycle)");
     v("odom_alpha3", odom_alpha3, non_negative(), "",
       "variance of the yaw rate or steering angle per squared speed, eq. (6)");
-    v("odom_alpha4", odom_alpha4, non_negative(), "", "variance of the yaw rate or steering angle per its own square");
-    v("odom_alpha5", odom_alpha5, non_negative(), "",
-      "variance of the additional yaw rate, (rad/s)^2, per squared speed, eq. (7)");
+    v("odom_alpha4", odom_alpha4, non_negative(), "",
+      "variance of the yaw rate or steering angle per squared yaw rate or steering angle");
+    v("odom_alpha5", odom_alpha5, non_negative(), "(rad/s)^2/(m/s)^2",
+      "variance of the additional yaw rate per squared speed, eq. (7)");
     v("odom_alpha6", odom_alpha6, non_negative(), "",
       "variance of the additional yaw rate per squared yaw rate or steering angle");
-    v("odom_noise_scale", odom_noise_scale, non_negative(), "", "factor on all six");
+    v("odom_noise_scale", odom_noise_scale, non_negative(), "", "factor on odom_alpha1 to odom_alpha6");
     v("odom_noise_interval", odom_noise_interval, positive(), "s",
-      "length of the step that these variances are meant for");
+      "length of the time step to which odom_alpha1 to odom_alpha6 apply");
   }
 };
 

@@ -20,16 +20,18 @@ struct OdometryErrorParameters {
 
   void visit(ParameterVisitor& v) {
     v("motion_noise_factor", motion_noise_factor, non_negative(), "",
-      "on the variances of the motion noise, most of which are scale and yaw-rate error");
+      "factor on the variances of the motion noise, most of which are due to scale and yaw-rate errors");
     v.basic()("speed_scale_sigma", speed_scale_sigma, non_negative(), "",
               "initial standard deviation of the odometry's relative speed error");
-    v("speed_scale_walk", speed_scale_walk, non_negative(), "1/sqrt(s)", "its random walk");
+    v("speed_scale_walk", speed_scale_walk, non_negative(), "1/sqrt(s)",
+      "random walk of the odometry's relative speed error");
     v("yaw_rate_bias_sigma", yaw_rate_bias_sigma, non_negative(), "rad/s",
       "initial standard deviation of the odometry's yaw-rate error");
-    v("yaw_rate_bias_walk", yaw_rate_bias_walk, non_negative(), "rad/s/sqrt(s)", "its random walk");
+    v("yaw_rate_bias_walk", yaw_rate_bias_walk, non_negative(), "rad/s/sqrt(s)",
+      "random walk of the odometry's yaw-rate error");
     v("position_walk", position_walk, non_negative(), "m/sqrt(s) per axis", "random walk of the position while moving");
     v("heading_walk", heading_walk, non_negative(), "rad/sqrt(s)", "random walk of the heading while moving");
-    v("parked_walk", parked_walk, non_negative(), "m/sqrt(s)", "random walk of the position at a standstill");
+    v("parked_walk", parked_walk, non_negative(), "m/sqrt(s) per axis", "random walk of the position at a standstill");
   }
 };
 

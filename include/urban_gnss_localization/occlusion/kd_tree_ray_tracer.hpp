@@ -23,14 +23,18 @@ struct KdTreeRayTracerParameters {
   double epsilon{0.0};
 
   void visit(ParameterVisitor& v) {
-    v("min_range", min_range, non_negative(), "m", "what is nearer to the antenna is the robot itself");
-    v("max_range", max_range, positive(), "m", "how far a ray is followed");
-    v("range_step", range_step, positive(), "m", "r_inc");
-    v("search_radius", search_radius, positive(), "m", "at the antenna");
-    v("search_radius_slope", search_radius_slope, non_negative(), "", "0 keeps the radius fixed");
-    v("search_radius_max", search_radius_max, positive(), "", "m");
-    v("min_neighbours", min_neighbours, at_least(1), "", "so many points within the radius obstruct");
-    v("epsilon", epsilon, non_negative(), "", "the search may be wrong by the factor 1 + epsilon (Arya et al. 1998)");
+    v("min_range", min_range, non_negative(), "m",
+      "distance from the antenna below which an obstacle is the robot itself");
+    v("max_range", max_range, positive(), "m", "distance up to which a ray is followed");
+    v("range_step", range_step, positive(), "m", "step along a ray, r_inc");
+    v("search_radius", search_radius, positive(), "m", "search radius at the antenna");
+    v("search_radius_slope", search_radius_slope, non_negative(), "",
+      "growth of the search radius with range; 0: constant radius");
+    v("search_radius_max", search_radius_max, positive(), "m", "greatest search radius");
+    v("min_neighbours", min_neighbours, at_least(1), "",
+      "number of points within the search radius that obstruct a ray");
+    v("epsilon", epsilon, non_negative(), "",
+      "tolerance of the search, which may be wrong by a factor of 1 + epsilon (Arya et al. 1998)");
   }
   void check(std::vector<std::string>& faults) const;
 };

@@ -23,13 +23,14 @@ struct LocalMapParameters {
 
   void visit(ParameterVisitor& v) {
     v.basic()("body_radius", body_radius, non_negative(), "m",
-      "horizontally from base_link_frame: the robot itself is cut out");
-    v("min_height", min_height, any_number(), "", "m above base_link_frame: what is lower is ground");
-    v("max_scan_range", max_scan_range, positive(), "m", "from the sensor: what is farther is cut");
-    v("align", align, "align scans to the map, in place of the odometry alone");
-    v("align_radius", align_radius, positive(), "m", "about the sensor, the part of the map that a scan is aligned to");
-    v("keyframe_distance", keyframe_distance, positive(), "", "m travelled from one alignment to the next");
-    v("keyframe_angle", keyframe_angle, positive(), "", "rad turned from one alignment to the next");
+              "horizontal distance from base_link_frame within which points are cut as the robot's own body");
+    v("min_height", min_height, any_number(), "m", "height above base_link_frame below which points are cut as ground");
+    v("max_scan_range", max_scan_range, positive(), "m", "distance from the sensor beyond which points are cut");
+    v("align", align, "whether scans are aligned to the map, in place of the odometry alone");
+    v("align_radius", align_radius, positive(), "m",
+      "radius about the sensor of the part of the map that a scan is aligned to");
+    v("keyframe_distance", keyframe_distance, positive(), "m", "distance travelled from one alignment to the next");
+    v("keyframe_angle", keyframe_angle, positive(), "rad", "angle turned from one alignment to the next");
   }
   void check(std::vector<std::string>& faults) const;
 };

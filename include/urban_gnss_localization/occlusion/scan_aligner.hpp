@@ -35,21 +35,26 @@ struct ScanAlignerParameters {
   double max_correction_angle{0.17};
 
   void visit(ParameterVisitor& v) {
-    v("freedom", freedom, "planar: x, y and yaw; full: all six");
-    v("max_iterations", max_iterations, between(1, 1000), "", "of an alignment");
-    v("max_points", max_points, at_least(50), "", "of the scan, evenly chosen");
-    v("normal_neighbours", normal_neighbours, between(4, 50), "", "points of the map from which a plane is fitted");
-    v("max_distance", max_distance, positive(), "", "m to the nearest point of the map, at the first iteration");
-    v("final_distance", final_distance, positive(), "", "m to it at the last iteration and for the checks");
-    v("inlier_distance", inlier_distance, positive(), "", "m to the plane");
+    v("freedom", freedom, "degrees of freedom of the alignment; planar: x, y and yaw; full: all six");
+    v("max_iterations", max_iterations, between(1, 1000), "", "greatest number of iterations of an alignment");
+    v("max_points", max_points, at_least(50), "",
+      "greatest number of points of the scan that are aligned, evenly chosen");
+    v("normal_neighbours", normal_neighbours, between(4, 50), "",
+      "number of points of the map from which a plane is fitted");
+    v("max_distance", max_distance, positive(), "m",
+      "greatest distance from a point to the nearest point of the map in the first iteration");
+    v("final_distance", final_distance, positive(), "m",
+      "greatest distance from a point to the nearest point of the map in the last iteration and for the checks");
+    v("inlier_distance", inlier_distance, positive(), "m", "greatest distance from an inlier to its plane");
     v("min_inlier_fraction", min_inlier_fraction, between(0.0, 1.0), "",
-      "least share of inliers, of the points near flat pieces of the map");
+      "least share of inliers among the points near flat pieces of the map");
     v("min_overlap", min_overlap, between(0.0, 1.0), "", "least share of points near flat pieces of the map");
-    v("max_residual", max_residual, positive(), "m", "RMS of the inliers' distances to their planes");
+    v("max_residual", max_residual, positive(), "m", "greatest RMS of the inliers' distances to their planes");
     v("min_conditioning", min_conditioning, between(0.0, 1.0), "",
       "least share of the constraint in any direction; a corridor has none along it");
-    v("max_correction", max_correction, positive(), "m", "farthest from the odometry's guess");
-    v("max_correction_angle", max_correction_angle, positive(), "rad", "likewise");
+    v("max_correction", max_correction, positive(), "m", "greatest translation away from the odometry's guess");
+    v("max_correction_angle", max_correction_angle, positive(), "rad",
+      "greatest rotation away from the odometry's guess");
   }
   void check(std::vector<std::string>& faults) const;
 };

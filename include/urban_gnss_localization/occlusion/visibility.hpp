@@ -28,11 +28,13 @@ struct VisibilityParameters {
   double permeable_loss{10.0};
 
   void visit(ParameterVisitor& v) {
-    v("azimuth_samples", azimuth_samples, between(1, 101), "", "rays over the uncertainty of its azimuth");
-    v("elevation_samples", elevation_samples, between(1, 101), "", "rays over the uncertainty of its elevation");
+    v("azimuth_samples", azimuth_samples, between(1, 101), "",
+      "number of rays over the uncertainty of a satellite's azimuth");
+    v("elevation_samples", elevation_samples, between(1, 101), "",
+      "number of rays over the uncertainty of a satellite's elevation");
     v("known_range", known_range, positive(), "m",
-      "of the way to it that the lidar must have looked at for it to be known");
-    v("permeable_loss", permeable_loss, positive(), "m", "of vegetation that block a signal as a wall does");
+      "length of the way to a satellite that the lidar must have observed for the way to be known");
+    v("permeable_loss", permeable_loss, positive(), "m", "length of vegetation that blocks a signal as a wall does");
   }
 };
 

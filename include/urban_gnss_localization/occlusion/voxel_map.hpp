@@ -27,13 +27,13 @@ struct VoxelMapParameters {
   double observed_cell{4.0};
 
   void visit(ParameterVisitor& v) {
-    v("voxel_size", voxel_size, at_least(0.01), "", "m");
-    v("window", window, positive(), "m", "voxels farther than this from the sensor are dropped");
+    v("voxel_size", voxel_size, at_least(0.01), "m", "edge length of a voxel");
+    v("window", window, positive(), "m", "distance from the sensor beyond which voxels are dropped");
     v("max_voxels", max_voxels, between(1000, 100000000), "",
-      "bound of the memory; beyond it the farthest are dropped");
+      "greatest number of voxels in memory; beyond it the farthest are dropped");
     v("ray_stride", ray_stride, at_least(1), "",
-      "every so many returns' ray is followed, for vegetation and observed space");
-    v("observed_cell", observed_cell, at_least(0.1), "m", "edge of the cubes of observed space");
+      "number of returns for each ray that is followed, for vegetation and observed space");
+    v("observed_cell", observed_cell, at_least(0.1), "m", "edge length of the cubes of observed space");
   }
 };
 

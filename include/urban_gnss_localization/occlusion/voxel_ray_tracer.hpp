@@ -16,12 +16,13 @@ struct VoxelRayTracerParameters {
   double max_permeability{0.5};
 
   void visit(ParameterVisitor& v) {
-    v("min_range", min_range, non_negative(), "m", "what is nearer to the antenna is the robot itself");
-    v("max_range", max_range, positive(), "m", "how far a ray is followed");
-    v("link_length", link_length, between(1.0, VoxelMap::kCellVoxels), "",
-      "in voxels: farther apart, two points are not of one surface");
+    v("min_range", min_range, non_negative(), "m",
+      "distance from the antenna below which an obstacle is the robot itself");
+    v("max_range", max_range, positive(), "m", "distance up to which a ray is followed");
+    v("link_length", link_length, between(1.0, VoxelMap::kCellVoxels), "voxels",
+      "distance beyond which two points do not belong to one surface");
     v("max_permeability", max_permeability, between(0.0, 1.0), "",
-      "a voxel that lets a larger share of the lidar's rays through is vegetation");
+      "share of the lidar's rays let through above which a voxel is vegetation");
   }
   void check(std::vector<std::string>& faults) const;
 };

@@ -14,7 +14,7 @@ struct BiasMatcherParameters {
 
   void visit(ParameterVisitor& v) {
     v("bias_timeout", bias_timeout, non_negative(), "s",
-      "of odometry that a fix waits for its gps/bias; then the radius of the last one is used");
+      "time, by the odometry's stamps, that a fix waits for its gps/bias; then the last radius is used");
   }
 };
 

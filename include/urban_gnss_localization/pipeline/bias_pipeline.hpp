@@ -24,8 +24,9 @@ struct BiasPipelineParameters {
   void visit(ParameterVisitor& v) {
     v.include(input);
     v("estimate_timeout", estimate_timeout, non_negative(), "s",
-      "of odometry after a fix at which it alone carries the last estimate to the fix");
-    v.group("bias_filter", bias, "The Kalman filter of the bias, Nishida et al. eq. (14) to (21).");
+      "time, by the odometry's stamps, that a fix waits for an estimate; then odometry alone carries the last one on "
+      "to it");
+    v.group("bias_filter", bias, "Kalman filter of the bias, Nishida et al. eq. (14) to (21).");
   }
 };
 

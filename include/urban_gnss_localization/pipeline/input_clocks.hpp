@@ -17,11 +17,11 @@ struct StampParameters {
 
   void visit(ParameterVisitor& v) {
     v("odometry_gap", odometry_gap, positive(), "s",
-      "without odometry after which the robot's place is unknown: localizer and bias filter start anew");
+      "time without odometry after which the robot's position is unknown and localizer and bias filter restart");
     v("time_jump", time_jump, positive(), "s",
-      "by which a stamp must be older than the last for its clock to have been set back");
+      "difference by which a stamp must be older than the last for its clock to count as set back");
     v("reset_on_time_jump", reset_on_time_jump,
-      "whether to start anew where a clock was set back, e.g. in a bag that is played in a loop");
+      "whether to restart when a clock is set back, e.g. in a bag played in a loop");
   }
 };
 

@@ -21,8 +21,8 @@ struct InputParameters {
 
   void visit(ParameterVisitor& v) {
     v.basic()("antenna_offset", antenna_offset, "m", "x and y of the antenna in base_link_frame");
-    v.group("stamps", stamps, "what the stamps of the messages tell");
-    v.group("fix_validation", fix_validation, "what is believed of a fix");
+    v.group("stamps", stamps, "Gaps and time jumps in the stamps of the messages.");
+    v.group("fix_validation", fix_validation, "Validation of a fix and of its declared covariance.");
   }
   void check(std::vector<std::string>& faults) const {
     if (antenna_offset.size() != 2) faults.push_back("antenna_offset: must be x and y (m)");

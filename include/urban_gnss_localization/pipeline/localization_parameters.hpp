@@ -17,7 +17,7 @@ struct SatelliteParameters {
 
   void visit(ParameterVisitor& v) {
     v("satellites_wait", satellites_wait, non_negative(), "s",
-      "of odometry that a fix waits for its gps/satellites, where the fix before it had some");
+      "time, by the odometry's stamps, that a fix waits for its gps/satellites if the fix before had some");
   }
 };
 
@@ -33,14 +33,14 @@ struct LocalizationParameters {
   StatusParameters status;
 
   void visit(ParameterVisitor& v) {
-    v.group("map_datum", datum, "the map frame's origin");
+    v.group("map_datum", datum, "Origin of the map frame.");
     v.include(input);
-    v.group("start", start, "from where the localizer starts, and when it starts anew");
-    v.group("imu", imu, "the IMU's yaw rate");
-    v.group("velocity", velocity, "the receiver's velocity");
-    v.group("satellites", satellites, "the satellites of a fix");
-    v.group("gps_bias", bias, "the bias of a fix, where the localizer takes it from a bias filter");
-    v.group("status", status, "when the localizer is said to be well");
+    v.group("start", start, "Start and restart of the localizer.");
+    v.group("imu", imu, "Yaw rate of the IMU.");
+    v.group("velocity", velocity, "Velocity of the receiver.");
+    v.group("satellites", satellites, "Satellites of a fix.");
+    v.group("gps_bias", bias, "Bias of a fix, where the localizer takes it from a bias filter.");
+    v.group("status", status, "Criteria of the localizer's status.");
   }
 };
 

@@ -17,10 +17,12 @@ struct MapConsistencyParameters {
   double doubtful_share{0.3};
 
   void visit(ParameterVisitor& v) {
-    v("strong_cn0", strong_cn0, between(0.0, 70.0), "dB-Hz", "a signal as strong as that has a line of sight");
-    v("consistency_time", consistency_time, positive(), "s", "after which an observation counts 1/e");
+    v("strong_cn0", strong_cn0, between(0.0, 70.0), "dB-Hz",
+      "C/N0 from which on a signal is taken to have a line of sight");
+    v("consistency_time", consistency_time, positive(), "s",
+      "time after which the weight of an observation has fallen to 1/e");
     v("doubtful_share", doubtful_share, between(0.01, 1.0), "",
-      "of the blocked satellites that are received strongly: heading or map is wrong");
+      "share of the blocked satellites received strongly at which heading or map is taken to be wrong");
   }
 };
 

@@ -37,19 +37,19 @@ struct OcclusionParameters {
   double sky_mask{0.17};
 
   void visit(ParameterVisitor& v) {
-    v.basic()("tracer", tracer, "voxel, or kdtree: Algorithm 2 as printed, slow");
+    v.basic()("tracer", tracer, "ray tracer; kdtree: Algorithm 2 as printed, slow");
     v.basic()("antenna_offset", antenna_offset, "m",
-              "antenna in base_link_frame; zeros: from tf, by the fix's frame_id");
-    v("antenna_sigma", antenna_sigma, non_negative(), "",
-      "m per horizontal axis: how well the antenna is placed in the map");
-    v("heading_sigma", heading_sigma, non_negative(), "rad", "at least that much is not known of the heading");
-    v("heading_timeout", heading_timeout, positive(), "s", "an older heading is not used");
-    v("satellites_max_age", satellites_max_age, positive(), "s", "older satellites are not used for a fix");
-    v("map_timeout", map_timeout, positive(), "s", "without a cloud after which the map is no longer believed");
+              "x, y and z of the antenna in base_link_frame; zeros: from tf, by the fix's frame_id");
+    v("antenna_sigma", antenna_sigma, non_negative(), "m per horizontal axis",
+      "standard deviation of the antenna's position in the map");
+    v("heading_sigma", heading_sigma, non_negative(), "rad", "least standard deviation assumed for the heading");
+    v("heading_timeout", heading_timeout, positive(), "s", "age beyond which a heading is not used");
+    v("satellites_max_age", satellites_max_age, positive(), "s", "age beyond which satellites are not used for a fix");
+    v("map_timeout", map_timeout, positive(), "s", "time without a cloud after which the map is no longer trusted");
     v("sky_azimuths", sky_azimuths, between(8, 720), "",
-      "directions of the skyline, where there are no satellites and for the sky plot");
+      "number of azimuths of the skyline, for fixes without satellites and for the sky plot");
     v("sky_mask", sky_mask, between(0.0, 1.5), "rad",
-      "elevation from which the sky counts where there are no satellites");
+      "elevation above which the sky counts for fixes without satellites");
   }
   void check(std::vector<std::string>& faults) const;
 };
@@ -67,13 +67,13 @@ struct OcclusionPipelineParameters {
 
   void visit(ParameterVisitor& v) {
     v.include(occlusion);
-    v.group("visibility", visibility, "The rays that are traced to a satellite.");
-    v.group("local_map", local_map, "The map of the surroundings, made of the lidar's clouds.");
-    v.group("voxels", voxels, "Its voxels.");
-    v.group("aligner", aligner, "The alignment of a cloud with the map (ICP).");
-    v.group("voxel_tracer", voxel_tracer, "Where a ray through the voxels is blocked.");
-    v.group("covariance", covariance, "The covariance of a fix, from what is visible.");
-    v.group("consistency", consistency, "Whether map and satellites agree.");
+    v.group("visibility", visibility, "Rays traced to a satellite.");
+    v.group("local_map", local_map, "Map of the surroundings, built from the lidar's clouds.");
+    v.group("voxels", voxels, "Voxels of the map.");
+    v.group("aligner", aligner, "Alignment of a cloud with the map (ICP).");
+    v.group("voxel_tracer", voxel_tracer, "Obstruction of a ray through the voxels.");
+    v.group("covariance", covariance, "Covariance of a fix, from the visible satellites.");
+    v.group("consistency", consistency, "Agreement of map and satellites.");
   }
 };
 

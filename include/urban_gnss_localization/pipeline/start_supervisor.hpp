@@ -21,16 +21,16 @@ struct StartParameters {
   HeadingInitializerParameters heading;
 
   void visit(ParameterVisitor& v) {
-    v("initial_pose", initial_pose, "m, m, rad", "x, y and yaw in the map frame; empty: from fixes and motion");
-    v("initial_position_sigma", initial_position_sigma, non_negative(), "m",
-      "standard deviation of initial_pose per axis");
+    v("initial_pose", initial_pose, "m, m, rad", "initial x, y and yaw in the map frame; empty: from fixes and motion");
+    v("initial_position_sigma", initial_position_sigma, non_negative(), "m per axis",
+      "standard deviation of the position in initial_pose");
     v("initial_heading_sigma", initial_heading_sigma, non_negative(), "rad",
-      "standard deviation of initial_pose's yaw");
+      "standard deviation of the yaw in initial_pose");
     v("max_bias_radius", max_bias_radius, positive(), "m",
-      "distance from the estimate, beyond 3 standard deviations of a fix, that reflections can explain (Nishida et "
-      "al.)");
+      "distance of a fix from the estimate, beyond 3 standard deviations of the fix, that reflections can explain "
+      "(Nishida et al.)");
     v("lost_timeout", lost_timeout, positive(), "s",
-      "of nothing but fixes farther than max_bias_radius after which the estimate is what is wrong");
+      "time with nothing but fixes farther than max_bias_radius after which the estimate is taken to be wrong");
     v.include(heading);
   }
   void check(std::vector<std::string>& faults) const;

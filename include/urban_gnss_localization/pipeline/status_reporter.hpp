@@ -17,9 +17,9 @@ struct StatusParameters {
   double heading_converged_sigma{0.3};
 
   void visit(ParameterVisitor& v) {
-    v("fix_timeout", fix_timeout, positive(), "s", "without a fix that was used after which this is dead reckoning");
+    v("fix_timeout", fix_timeout, positive(), "s", "time without a used fix after which the status is dead reckoning");
     v("heading_converged_sigma", heading_converged_sigma, positive(), "rad",
-      "standard deviation of the heading below which it is said to be known (~status, healthy)");
+      "standard deviation of the heading below which it counts as known (~status, healthy)");
   }
 };
 

@@ -20,11 +20,11 @@ struct VelocityParameters {
   double velocity_sigma_floor{0.05};
 
   void visit(ParameterVisitor& v) {
-    v("use_gps_velocity", use_gps_velocity, "whether gps/velocity is subscribed, where the localizer makes use of it");
-    v("velocity_sigma_default", velocity_sigma_default, positive(), "m/s",
-      "standard deviation per axis where a receiver declares no covariance of its velocity");
-    v("velocity_sigma_floor", velocity_sigma_floor, positive(), "m/s",
-      "standard deviation per axis that is added to the declared covariance");
+    v("use_gps_velocity", use_gps_velocity, "whether gps/velocity is subscribed, where the localizer can use it");
+    v("velocity_sigma_default", velocity_sigma_default, positive(), "m/s per axis",
+      "standard deviation of a velocity for which the receiver declares no covariance");
+    v("velocity_sigma_floor", velocity_sigma_floor, positive(), "m/s per axis",
+      "standard deviation whose square is added to the declared covariance of a velocity");
   }
 };
 

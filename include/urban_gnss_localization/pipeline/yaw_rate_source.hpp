@@ -17,7 +17,7 @@ struct YawRateParameters {
 
   void visit(ParameterVisitor& v) {
     v("use_imu_yaw_rate", use_imu_yaw_rate,
-      "whether imu/data is subscribed and, while it comes, its yaw rate is used in place of the odometry's");
+      "whether imu/data is subscribed and, while available, its yaw rate replaces the odometry's");
   }
 };
 

@@ -33,9 +33,9 @@ struct Frames {
   std::string base_link{"base_link"};
 
   void visit(ParameterVisitor& v) {
-    v.basic()("map_frame", map, "fixed to the world: x east, y north of the datum");
-    v.basic()("odom_frame", odom, "the frame of the odometry's pose");
-    v.basic()("base_link_frame", base_link, "the robot; Nishida et al. put it on the rear axle");
+    v.basic()("map_frame", map, "frame fixed to the world: x east, y north of the datum");
+    v.basic()("odom_frame", odom, "frame of the odometry's pose");
+    v.basic()("base_link_frame", base_link, "frame of the robot; Nishida et al. put it on the rear axle");
   }
   void check(std::vector<std::string>& faults) const;
 };

@@ -16,7 +16,7 @@ struct GpsBiasNodeParameters {
 
   void visit(ParameterVisitor& v) {
     v.basic()("localizer", localizer,
-              "name of the localizer's node, whose frames, antenna and belief in fixes count here; empty: the defaults");
+              "name of the localizer's node, whose frames, antenna and fix validation apply here; empty: the defaults");
     v.include(frames);
     v.include(bias);
   }

@@ -38,11 +38,11 @@ struct LocalizerNodeParameters {
 
   void visit(ParameterVisitor& v) {
     v.include(frames);
-    v.basic()("publish_tf", publish_tf, "broadcast map -> odom; false where another localizer does");
+    v.basic()("publish_tf", publish_tf, "whether map -> odom is broadcast; false where another localizer does");
     v("transform_time_offset", transform_time_offset, any_number(), "s",
-      "added to the stamp of map -> odom, so that users need not wait for the next");
+      "time added to the stamp of map -> odom, so that users need not wait for the next");
     v("antenna_offset_from_tf", antenna_offset_from_tf,
-      "take antenna_offset from tf (base_link -> the fix's frame_id) where it is [0, 0]");
+      "whether antenna_offset is taken from tf (base_link -> the fix's frame_id) where it is [0, 0]");
     v.include(localization);
   }
 };

@@ -14,7 +14,7 @@ struct ParticlePublisherParameters {
 
   void visit(ParameterVisitor& v) {
     v("particle_cloud_rate", particle_cloud_rate, non_negative(), "Hz",
-      "of the stamps at which particle_cloud and particle_cloud_weighted are published; 0: never");
+      "rate, by the stamps, at which particle_cloud and particle_cloud_weighted are published; 0: never");
   }
 };
 

@@ -32,15 +32,16 @@ struct OcclusionNodeParameters {
 
   void visit(ParameterVisitor& v) {
     v.basic()("prior_map", prior_map,
-      ".pcd file, m east, north and up of map_frame's origin; ~clear_map leaves it; empty: none");
+              "prior map, a .pcd file in m east, north and up of map_frame's origin; ~clear_map keeps it; empty: none");
     v("tf_timeout", tf_timeout, non_negative(), "s",
-      "of the fixes' stamps that a cloud or a fix waits for its transform");
-    v("cloud_queue", cloud_queue, between(1, 1000), "", "clouds that wait at most; beyond that the oldest is dropped");
+      "time, by the fixes' stamps, that a cloud or a fix waits for its transform");
+    v("cloud_queue", cloud_queue, between(1, 1000), "",
+      "greatest number of clouds that wait; beyond it the oldest is dropped");
     v("time_jump", time_jump, positive(), "s",
-      "a stamp older than the last by more than this is a clock that was set back");
-    v("map_publish_period", map_publish_period, positive(), "",
-      "s between publications of the map, where somebody listens");
-    v("sky_plot_size", sky_plot_size, between(50, 4000), "", "pixels, width and height of gps/sky_plot");
+      "difference by which a stamp must be older than the last for its clock to count as set back");
+    v("map_publish_period", map_publish_period, positive(), "s",
+      "time between publications of the map, while it has subscribers");
+    v("sky_plot_size", sky_plot_size, between(50, 4000), "px", "width and height of gps/sky_plot");
   }
 };
 

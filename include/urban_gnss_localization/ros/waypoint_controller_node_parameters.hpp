@@ -14,7 +14,7 @@ struct WaypointControllerNodeParameters {
     v.include(steering);
     v.basic()("first_target", first_target, non_negative(), "", "index of the target to steer for first");
     v.basic()("estimate_timeout", estimate_timeout, positive(), "s",
-              "of wall time without an estimate after which the robot is stopped");
+              "wall time without an estimate after which the robot is stopped");
   }
 };
 

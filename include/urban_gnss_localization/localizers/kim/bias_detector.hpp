@@ -16,14 +16,15 @@ struct BiasDetectorParameters {
 
   void visit(ParameterVisitor& v) {
     v("gate_probability", gate_probability, between(0.5, 0.999999), "",
-      "probability that an unbiased fix is taken for one, 2 DOF (paper: 0.95)");
-    v("ramp_slack", ramp_slack, non_negative(), "",
-      "sigma per fix, drift of the innovations that is not summed (CUSUM)");
-    v("ramp_threshold", ramp_threshold, positive(), "",
-      "sigma, sum at which they drift: with 0.5 above, falsely once in 7800 fixes");
-    v("inert_window", inert_window, between(1, 10000), "", "of fixes that the \"gate inert\" warning looks at");
+      "probability that an unbiased fix is classified as unbiased, 2 DOF (paper: 0.95)");
+    v("ramp_slack", ramp_slack, non_negative(), "sigma per fix",
+      "drift of the innovations that the CUSUM test ignores");
+    v("ramp_threshold", ramp_threshold, positive(), "sigma",
+      "CUSUM of the innovations at which they are taken to drift; 8 with a ramp_slack of 0.5: one false alarm in 7800 "
+      "fixes");
+    v("inert_window", inert_window, between(1, 10000), "", "number of fixes examined for the \"gate inert\" warning");
     v("inert_probability", inert_probability, between(1e-9, 0.1), "",
-      "probability that a gate that works is called inert");
+      "probability that a gate that works is reported as inert");
   }
 };
 

@@ -46,32 +46,36 @@ struct ComplementaryEkfParameters {
 
   void visit(ParameterVisitor& v) {
     v.basic()("mode", mode,
-              "standard: all fixes as they are; gated: biased ones rejected; compensated: the bias is estimated");
+              "treatment of biased fixes; standard: used; gated: rejected; compensated: the bias is estimated");
     v("adapt_every_mode", adapt_every_mode,
-      "standard and gated too: noise as the fixes show, gated also finds ramps; false: the paper's conventional filter "
-      "(section 2.3), which believes the declared covariance");
-    v("fix_bias_sigma", fix_bias_sigma, positive(), "m per axis", "M0: the bias when the filter opens");
+      "whether standard and gated, too, take the noise from the fixes, and gated detects ramps; false: the paper's "
+      "conventional filter (section 2.3), which trusts the declared covariance");
+    v("fix_bias_sigma", fix_bias_sigma, positive(), "m per axis",
+      "standard deviation of the bias when the bias filter opens (M0)");
     v("fix_bias_time", fix_bias_time, positive(), "s",
-      "after which a bias has faded; with fix_bias_sigma this gives the growth of M");
+      "time constant of the bias's decay; with fix_bias_sigma it gives the growth of M");
     v("close_probability", close_probability, between(0.01, 0.999999), "",
-      "a bias inside this quantile is insignificant");
+      "probability of the quantile within which a bias is insignificant");
     v("close_count", close_count, between(1, 10000), "",
-      "of fixes with an insignificant bias after which the filter closes");
+      "number of consecutive fixes with an insignificant bias after which the bias filter closes");
     v("detection_horizon", detection_horizon, non_negative(), "s",
-      "of doubted fixes after which the odometry's growing uncertainty widens no test");
+      "time of doubted fixes after which the odometry's growing uncertainty no longer widens the tests");
     v("parked_correlation_time", parked_correlation_time, non_negative(), "s",
-      "correlation time of a fix's error while the robot stands");
+      "correlation time of the errors of fixes at a standstill");
     v("lockout_policy", lockout_policy,
-      "automatic: position anew on the fixes; dead_reckoning: until a fix agrees again");
-    v("lockout_timeout", lockout_timeout, positive(), "s", "of nothing but rejected fixes");
-    v("bias_open_timeout", bias_open_timeout, positive(), "s", "of an open bias filter");
+      "response to fixes that contradict the estimate for long; automatic: position restarts on the fixes; "
+      "dead_reckoning: odometry alone until a fix agrees again");
+    v("lockout_timeout", lockout_timeout, positive(), "s",
+      "time with nothing but rejected fixes after which the position restarts (automatic)");
+    v("bias_open_timeout", bias_open_timeout, positive(), "s",
+      "time with the bias filter open after which the position restarts (automatic)");
     v("lockout_gap", lockout_gap, positive(), "s",
-      "without a fix that end such a run: after a blackout it counts anew");
+      "time without a fix that ends a run of rejected fixes, after which lockout_timeout counts anew");
     v("estimate_odometry_errors", estimate_odometry_errors,
-      "speed scale and yaw-rate bias as states; false: the paper's (x, y, heading)");
-    v.group("detector", detector, "When a fix is taken for biased.");
-    v.group("fix_noise", fix_noise, "The noise of the fixes, as they show it.");
-    v.group("odometry", odometry, "The odometry's own errors.");
+      "whether speed scale and yaw-rate bias are states; false: the paper's (x, y, heading)");
+    v.group("detector", detector, "Detection of a biased fix.");
+    v.group("fix_noise", fix_noise, "Noise of the fixes, estimated from the fixes.");
+    v.group("odometry", odometry, "Errors of the odometry.");
     v.group("motion", motion, "Noise of the motion, Nishida et al. eq. (5) to (8).");
   }
 };

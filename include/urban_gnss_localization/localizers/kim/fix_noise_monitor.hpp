@@ -14,12 +14,13 @@ struct FixNoiseParameters {
   double fix_noise_max_inflation{20.0};
 
   void visit(ParameterVisitor& v) {
-    v("adapt_fix_noise", adapt_fix_noise, "enlarge the declared covariance where errors are correlated or larger");
-    v("fix_noise_horizon", fix_noise_horizon, positive(), "",
-      "s apart at which the errors of two fixes are taken for independent");
-    v("fix_noise_memory", fix_noise_memory, at_least(1.0), "", "of fixes averaged over");
+    v("adapt_fix_noise", adapt_fix_noise,
+      "whether the declared covariance is enlarged where errors are correlated or larger");
+    v("fix_noise_horizon", fix_noise_horizon, positive(), "s",
+      "time between two fixes from which on their errors are taken to be independent");
+    v("fix_noise_memory", fix_noise_memory, at_least(1.0), "", "number of fixes over which the noise is averaged");
     v("fix_noise_max_inflation", fix_noise_max_inflation, at_least(1.0), "",
-      "most that a covariance (a variance) is multiplied by");
+      "greatest factor on a declared covariance (a variance)");
   }
 };
 

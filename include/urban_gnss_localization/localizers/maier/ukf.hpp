@@ -31,18 +31,21 @@ struct UkfParameters {
   double ukf_kappa{0.0};
 
   void visit(ParameterVisitor& v) {
-    v.basic()("outliers", outliers, "fixes that are far off: student_t weighs them down, gate rejects, none uses them");
-    v("student_dof", student_dof, positive(), "degrees", "of freedom of student_t; small is robust, large is Gaussian");
+    v.basic()("outliers", outliers,
+              "treatment of outlying fixes; student_t: weighted down; gate: rejected; none: used as they are");
+    v("student_dof", student_dof, positive(), "",
+      "degrees of freedom of Student's t-distribution (student_t); small: robust; large: Gaussian");
     v("gate_probability", gate_probability, open_between(0.0, 1.0), "",
-      "probability that a good fix is not called an outlier; 1 calls none");
+      "probability that a good fix is not classified as an outlier; 1: no fix is");
     v("gate_timeout", gate_timeout, positive(), "s",
-      "of nothing but rejections after which gate starts anew on the fix");
+      "time with nothing but rejected fixes after which the filter restarts on the fix (gate)");
     v("fix_correlation_time", fix_correlation_time, non_negative(), "s",
-      "over which the error of fixes stays the same; 0: independent errors");
-    v.group("odometry", odometry, "The odometry's own errors, which the filter estimates.");
-    v("ukf_alpha", ukf_alpha, between(1e-3, 1.0), "", "spread of the sigma points");
-    v("ukf_beta", ukf_beta, non_negative(), "", "weight of the central one in the covariance; 2 for Gaussian errors");
-    v("ukf_kappa", ukf_kappa, non_negative(), "", "secondary spread");
+      "correlation time of the errors of fixes; 0: independent errors");
+    v.group("odometry", odometry, "Errors of the odometry, which the filter estimates.");
+    v("ukf_alpha", ukf_alpha, between(1e-3, 1.0), "", "spread alpha of the sigma points");
+    v("ukf_beta", ukf_beta, non_negative(), "",
+      "weight beta of the central sigma point in the covariance; 2: for Gaussian errors");
+    v("ukf_kappa", ukf_kappa, non_negative(), "", "secondary spread kappa of the sigma points");
   }
 };
 

@@ -55,16 +55,19 @@ struct GpsBiasParameters {
   double shadow_probability{0.99};
 
   void visit(ParameterVisitor& v) {
-    v("bias_input", bias_input, "the filter runs on fix minus predicted antenna (residual) or as printed (position)");
-    v("shadow_sigma", shadow_sigma, positive(), "m", "sigma_s = sigma_c: noise of a fix in the shadow, eq. (15), (18)");
-    v("bias_acceleration_density", bias_acceleration_density, non_negative(), "",
-      "m/s^2/sqrt(Hz), how fast the bias may change, eq. (17); 0 as printed");
-    v("bias_rate_sigma", bias_rate_sigma, positive(), "m/s", "standard deviation of the bias's rate at the start");
+    v("bias_input", bias_input,
+      "input of the filter: fix minus predicted antenna (residual), or as printed (position)");
+    v("shadow_sigma", shadow_sigma, positive(), "m",
+      "standard deviation sigma_s = sigma_c of a fix in the shadow, eq. (15), (18)");
+    v("bias_acceleration_density", bias_acceleration_density, non_negative(), "m/s^2/sqrt(Hz)",
+      "noise density of the bias's acceleration, eq. (17); 0: as printed");
+    v("bias_rate_sigma", bias_rate_sigma, positive(), "m/s", "initial standard deviation of the bias's rate of change");
     v("gate_probability", gate_probability, open_between(0.0, 1.0), "",
-      "probability that a good fix passes the gate; 1 switches it off");
-    v("gate_timeout", gate_timeout, positive(), "s", "of nothing but rejections after which it starts anew on the fix");
+      "probability that a good fix passes the gate; 1: no gate");
+    v("gate_timeout", gate_timeout, positive(), "s",
+      "time with nothing but rejected fixes after which the filter restarts on the fix");
     v("shadow_probability", shadow_probability, between(0.5, 0.999999), "",
-      "confidence at which the bias counts as significant: in_shadow");
+      "confidence at which the bias counts as significant (in_shadow)");
   }
 };
 

@@ -41,24 +41,29 @@ struct ParticleFilterParameters {
   FixSigmaParameters fix;
 
   void visit(ParameterVisitor& v) {
-    v.basic()("mode", mode, "literal: as printed; paper: the reading that works; conventional: eq. (46), (47)");
+    v.basic()("mode", mode,
+              "filter variant; literal: as printed; paper: the reading that works; conventional: eq. (46), (47)");
     v.include(fix);
-    v("particle_count", particle_count, between(1, 1000000), "", "M");
+    v("particle_count", particle_count, between(1, 1000000), "", "number of particles, M");
     v("ring_share", ring_share, between(0.0, 1.0), "",
-      "0 to 1, share of particles drawn on the ring of radius r-hat, eq. (22)");
-    v("likelihood", likelihood, "eq. (27), (31): printed, sum or product; auto: product in paper, else printed");
+      "share of the particles drawn on the ring of radius r-hat, eq. (22)");
+    v("likelihood", likelihood,
+      "form of the likelihood, eq. (27), (31): printed, sum or product; auto: product in mode paper, else printed");
     v("use_gps_heading", use_gps_heading,
-      "theta_GPS, eq. (12): always or never; auto: not with the product likelihood");
-    v("gps_heading_sigma", gps_heading_sigma, positive(), "rad", "sigma_p, eq. (27), (31): noise of theta_GPS");
+      "use of theta_GPS, eq. (12): always or never; auto: not with the product likelihood");
+    v("gps_heading_sigma", gps_heading_sigma, positive(), "rad",
+      "standard deviation sigma_p of theta_GPS, eq. (27), (31)");
     v("ess_threshold", ess_threshold, non_negative(), "",
-      "resampling where the effective sample size, eq. (39), is below this");
-    v("resampling", resampling, "eq. (40): multinomial, or systematic (less variance)");
-    v("estimate", estimate, "eq. (35): mean of all particles, or of the heaviest_cluster");
-    v("cluster_cell", cluster_cell, positive(), "m", "particles within one to two cells belong together");
+      "effective sample size, eq. (39), below which the particles are resampled");
+    v("resampling", resampling, "resampling scheme, eq. (40): multinomial, or systematic (less variance)");
+    v("estimate", estimate, "output pose, eq. (35): mean of all particles, or of the heaviest cluster");
+    v("cluster_cell", cluster_cell, positive(), "m",
+      "cell size of the clustering; particles within one to two cells belong together");
     v("gate_probability", gate_probability, open_between(0.0, 1.0), "",
-      "conventional mode: probability that a good fix passes the gate; 1 switches it off");
-    v("gate_timeout", gate_timeout, positive(), "s", "of nothing but rejections after which it starts anew on the fix");
-    v("seed", seed, any_number(), "", "of the random numbers; the same bag and seed give the same estimates");
+      "probability that a good fix passes the gate (conventional); 1: no gate");
+    v("gate_timeout", gate_timeout, positive(), "s",
+      "time with nothing but rejected fixes after which the filter restarts on the fix");
+    v("seed", seed, any_number(), "", "seed of the random numbers; the same bag and seed give the same estimates");
   }
   void check(std::vector<std::string>& faults) const;
 

@@ -30,19 +30,18 @@ struct SwitchingModelParameters {
 
   void visit(ParameterVisitor& v) {
     v.include(fix);
-    v.group("fix_noise", noise, "What the covariance is worth that a receiver declares.");
+    v.group("fix_noise", noise, "Noise of the fixes relative to their declared covariance.");
     v.group("ranges", ranges,
-            "The ranges of a fix (gps/satellites): it is solved anew, each range in line of sight or reflected.");
-    v.group("velocity_noise", velocity, "What the velocity of a receiver (gps/velocity) is worth.");
-    v.group("bias", modes,
-            "The bias of a fix: it is received directly, or has a bias that changes slowly, fast, or at once.");
-    v.group("odometry", odometry, "The odometry's own errors, which the filter estimates.");
+            "Ranges of a fix (gps/satellites), from which it is solved anew, each in line of sight or reflected.");
+    v.group("velocity_noise", velocity, "Noise of the receiver's velocity (gps/velocity).");
+    v.group("bias", modes, "Bias of a fix: none in direct reception, else one that changes slowly, fast, or at once.");
+    v.group("odometry", odometry, "Errors of the odometry, which the filter estimates.");
     v("yaw_rate_scale_sigma", yaw_rate_scale_sigma, non_negative(), "",
       "standard deviation of the odometry's relative yaw-rate error, a constant");
     v("fix_scale_lag", fix_scale_lag, non_negative(), "s",
-      "between the fixes that are compared with the odometry between them; 0: none are");
+      "time between the fixes that are compared by means of the odometry between them; 0: no comparison");
     v("common_error_sigma", common_error_sigma, non_negative(), "m per axis",
-      "error that fixes share for long, as far as they declare as much");
+      "standard deviation of the error that fixes share for long; at most the declared one");
   }
 };
 

@@ -41,24 +41,28 @@ struct BiasModeParameters {
   double outlier_radius{200.0};
 
   void visit(ParameterVisitor& v) {
-    v("direct_time", direct_time, positive(), "s", "tau_S, mean time of direct reception until the next bias");
+    v("direct_time", direct_time, positive(), "s", "mean time tau_S of direct reception until the next bias");
     v("slow_bias_time", slow_bias_time, positive(), "s",
-      "tau_L, mean time of a slow bias until it changes fast or jumps");
+      "mean time tau_L of a slowly changing bias until it changes fast or jumps");
     v("fast_bias_time", fast_bias_time, positive(), "s",
-      "tau_F, mean time of a fast changing bias until it ends, is slow or jumps");
-    v("bias_end_time", bias_end_time, positive(), "s", "tau_LS, mean time of a slow bias until it ends");
-    v("jump_share", jump_share, between(0.0, 1.0), "",
-      "0 to 1, p_J, share of the onsets and changes that come at once");
-    v("slow_bias_walk", slow_bias_walk, non_negative(), "m/sqrt(s) per axis", "root of q_s");
-    v("fast_bias_walk", fast_bias_walk, non_negative(), "m/sqrt(s) per axis", "root of q_f");
-    v("jump_sigma", jump_sigma, positive(), "m per axis", "sigma_J, of a bias that came at once");
+      "mean time tau_F of a fast changing bias until it ends, becomes slow or jumps");
+    v("bias_end_time", bias_end_time, positive(), "s", "mean time tau_LS of a slowly changing bias until it ends");
+    v("jump_share", jump_share, between(0.0, 1.0), "", "share p_J of the onsets and changes of a bias that are jumps");
+    v("slow_bias_walk", slow_bias_walk, non_negative(), "m/sqrt(s) per axis",
+      "random walk of a slowly changing bias, root of q_s");
+    v("fast_bias_walk", fast_bias_walk, non_negative(), "m/sqrt(s) per axis",
+      "random walk of a fast changing bias, root of q_f");
+    v("jump_sigma", jump_sigma, positive(), "m per axis", "standard deviation sigma_J of a bias after a jump");
     v("bias_fade_time", bias_fade_time, non_negative(), "s",
-      "after which a bias is again like one that has just come; 0: it never forgets");
-    v("onset_sigma", onset_sigma, non_negative(), "m per axis", "of a bias that begins without a jump");
-    v("student_dof", student_dof, positive(), "degrees",
-      "of freedom of the noise in direct reception; large ones are Gaussian");
-    v("outlier_share", outlier_share, between(0.0, 0.5), "", "0 to 0.5, share of the fixes that say nothing");
-    v("outlier_radius", outlier_radius, positive(), "m", "within which such a fix is anywhere");
+      "time constant at which a bias is forgotten, its mean decaying to 0 and its spread growing to jump_sigma; 0: "
+      "never");
+    v("onset_sigma", onset_sigma, non_negative(), "m per axis",
+      "standard deviation of a bias that begins without a jump");
+    v("student_dof", student_dof, positive(), "",
+      "degrees of freedom of Student's t noise of a fix in direct reception; large: Gaussian");
+    v("outlier_share", outlier_share, between(0.0, 0.5), "",
+      "share of fixes that are outliers and carry no information");
+    v("outlier_radius", outlier_radius, positive(), "m", "radius within which an outlier may lie anywhere");
   }
 
   /// Share of the fixes times the density of what is anywhere: a fix's likelihood is at least this (1/m^2).

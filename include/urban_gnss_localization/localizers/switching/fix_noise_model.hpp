@@ -22,15 +22,17 @@ struct FixNoiseModelParameters {
 
   void visit(ParameterVisitor& v) {
     v("fix_scale_rate", fix_scale_rate, between(0.0, 1.0), "",
-      "change of the log of the factor on declared covariances with a fix; 0: they are right");
-    v("first_fix_scale", first_fix_scale, positive(), "", "that factor (on the variance) before anything is learnt");
+      "learning rate, per fix, of the logarithm of the factor on declared covariances; 0: they are right");
+    v("first_fix_scale", first_fix_scale, positive(), "",
+      "initial factor on declared covariances (variances), before anything is learnt");
     v("fix_covariance_weight", fix_covariance_weight, between(0.0, 1.0), "",
-      "0 to 1, how far the ups and downs of declared covariances are believed");
+      "weight of the fluctuations of declared covariances about their recent mean; 1: taken as declared");
     v("fix_scale_limit", fix_scale_limit, at_least(1.0), "",
-      "factor by which declared standard deviations may be wrong, either way");
+      "greatest factor by which declared standard deviations may be too small or too large");
     v("fix_correlation_time", fix_correlation_time, non_negative(), "s",
-      "over which the error of fixes stays the same; 0: independent errors");
-    v("parked_correlation_time", parked_correlation_time, non_negative(), "s", "the same while the robot stands");
+      "correlation time of the errors of fixes while the robot moves; 0: independent errors");
+    v("parked_correlation_time", parked_correlation_time, non_negative(), "s",
+      "correlation time of the errors of fixes at a standstill; 0: independent errors");
   }
 };
 

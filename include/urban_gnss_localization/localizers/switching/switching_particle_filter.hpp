@@ -20,13 +20,13 @@ struct SwitchingParticleFilterParameters {
 
   void visit(ParameterVisitor& v) {
     v("max_particles", max_particles, between(1, 10000), "",
-      "each is an extended Kalman filter; there are as many as are plausible");
+      "greatest number of particles, each an extended Kalman filter; only plausible ones are kept");
     v("merge_distance", merge_distance, non_negative(), "",
-      "Bhattacharyya distance below which particles of a mode become one; large: imm_ekf");
-    v("estimate", estimate, "mean of all particles, or of the heaviest_cluster");
+      "Bhattacharyya distance below which particles of the same mode are merged; large: imm_ekf");
+    v("estimate", estimate, "output pose: mean of all particles, or of the heaviest cluster");
     v("cluster_cell", cluster_cell, positive(), "m",
-      "added to the standard deviations of two particles, three of which may lie between them in a cluster");
-    v("seed", seed, any_number(), "", "of the random numbers; the same bag and seed give the same estimates");
+      "standard deviation added to those of two particles, which share a cluster within three of the combined ones");
+    v("seed", seed, any_number(), "", "seed of the random numbers; the same bag and seed give the same estimates");
     v.include(model);
   }
 };

@@ -15,12 +15,13 @@ struct VelocityNoiseParameters {
 
   void visit(ParameterVisitor& v) {
     v("velocity_scale_rate", velocity_scale_rate, between(0.0, 1.0), "",
-      "change of the log of the factor on its covariance with a velocity; 0: it is right");
+      "learning rate, per velocity, of the logarithm of the factor on declared covariances; 0: they are right");
     v("first_velocity_scale", first_velocity_scale, positive(), "",
-      "that factor (on the variance) before anything is learnt");
+      "initial factor on declared covariances (variances) of velocities, before anything is learnt");
     v("velocity_scale_limit", velocity_scale_limit, at_least(1.0), "",
-      "factor by which its standard deviations may be wrong, either way");
-    v("velocity_dof", velocity_dof, positive(), "degrees", "of freedom of its noise; large ones are Gaussian");
+      "greatest factor by which declared standard deviations of velocities may be too small or too large");
+    v("velocity_dof", velocity_dof, positive(), "",
+      "degrees of freedom of Student's t noise of a velocity; large: Gaussian");
   }
 
   /// Where nothing is learnt, receivers are right.
