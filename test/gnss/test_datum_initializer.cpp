@@ -161,7 +161,7 @@ TEST(DatumInitializer, ParameterIsChecked) {
   EXPECT_TRUE(faults_of({-90.0, 180.0, 0.0}).empty());
   EXPECT_EQ(faults_of({1.0, 2.0}).size(), 1u);
   EXPECT_EQ(faults_of({1.0, 2.0, 3.0, 4.0}).size(), 1u);
-  EXPECT_EQ(faults_of({91.0, 181.0, kNaN}).size(), 3u);
+  EXPECT_EQ(faults_of({91.0, 181.0, kNaN}).size(), 4u);  // each number, and a list that is not finite
 }
 
 }  // namespace
