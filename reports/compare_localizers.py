@@ -280,11 +280,12 @@ def ablate(results):
 def compare(options):
     """Run everything; gives the path of the page."""
     recordings = find_recordings(options.data, options.recordings)
-    methods = {name: ["--localizer", name] for name in options.methods or find_variants()}
     if options.ablation:
         methods = {ABLATED: ["--localizer", ABLATED]}
-        methods.update({name: ["--localizer", ABLATED] + [part for text in changes for part in ("--set", text)]
+        methods.update({name: methods[ABLATED] + [part for text in changes for part in ("--set", text)]
                         for name, changes in ABLATIONS.items()})
+    else:
+        methods = {name: ["--localizer", name] for name in options.methods or find_variants()}
     overrides = [part for text in options.overrides for part in ("--set", text)]
     results, tracks = {}, {}
     with concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:

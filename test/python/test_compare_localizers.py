@@ -34,7 +34,10 @@ for run in runs:
 """
 REPLAY = """#!/usr/bin/env python3
 import sys
-open(sys.argv[sys.argv.index("--output") + 1], "w").close()
+if "--list-variants" in sys.argv:
+    print("ekf\\nswitching")
+else:
+    open(sys.argv[sys.argv.index("--output") + 1], "w").close()
 """
 CSV_TO_BAG = """#!/usr/bin/env python3
 import sys

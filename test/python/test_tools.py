@@ -188,7 +188,7 @@ class ToolTest(unittest.TestCase):
             result = json.load(file)
         self.assertEqual(result["localizer"], "dummy")
         self.assertGreater(result["estimates"], 300)
-        self.assertLess(result["errors"]["position_m"]["median"], 5.0)
+        self.assertLess(result["errors"]["position_m"]["median"], 10.0)  # dead reckoning from a start by fixes
         with rosbag.Bag(self.path("out.bag")) as bag:
             covariances = {message.pose.covariance[0] for _, message, _ in bag.read_messages("/odometry/filtered")}
         self.assertEqual(covariances, {25.0})
