@@ -13,7 +13,7 @@ namespace {
 
 /// The conditions of section 4, from the files that the nodes read, for one lap.
 PaperExperimentConditions conditions(int seed) {
-  PaperFiles files;
+  YAML::Node files;
   for (const std::string name : kPaperFileNames) {
     files[name] = YAML::LoadFile(package_directory() + "/config/paper_field/" + name + ".yaml");
   }
@@ -21,6 +21,7 @@ PaperExperimentConditions conditions(int seed) {
   c.laps = 1;
   c.field.seed = seed;
   c.filter.seed = seed;
+  c.switching.seed = seed;
   return c;
 }
 

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "matchers.hpp"
+#include "urban_gnss_localization/gnss/fix_sigma.hpp"
 #include "urban_gnss_localization/localizers/switching/bias_modes.hpp"
 #include "urban_gnss_localization/parameters/parameter_reader.hpp"
 
