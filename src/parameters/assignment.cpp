@@ -18,14 +18,14 @@ void assign(YAML::Node map, const std::string& text) {
   while (true) {
     const auto dot = path.find('.', begin);
     const std::string name = path.substr(begin, dot == std::string::npos ? dot : dot - begin);
-    if (name.empty()) throw std::runtime_error(text + ": must be NAME=VALUE or GROUP.NAME=VALUE");
+    if (name.empty()) throw std::runtime_error(text + ": must be NAME=VALUE or SECTION.NAME=VALUE");
     if (dot == std::string::npos) {
       map[name] = value;
       return;
     }
     const YAML::Node below = map[name];
     if (below.IsDefined() && !below.IsNull() && !below.IsMap()) {
-      throw std::runtime_error(text + ": " + path.substr(0, dot) + " has no parameters below it");
+      throw std::runtime_error(text + ": " + path.substr(0, dot) + " is no section");
     }
     if (!below.IsDefined() || below.IsNull()) map[name] = YAML::Node(YAML::NodeType::Map);
     map.reset(map[name]);

@@ -193,16 +193,16 @@ void ParameterReader::on_end(const std::vector<std::string>& faults) {
 std::string ParameterReader::hint(const std::string& path) const {
   const std::string name = last_name(path);
   for (const std::string& known : known_) {
-    if (last_name(known) == name) return "; it is " + prefix_ + known;
+    if (last_name(known) == name) return "; it is " + known;
     for (const auto& [former, now] : kFormerNames) {
-      if (name == former && last_name(known) == now) return "; it is now " + prefix_ + known;
+      if (name == former && last_name(known) == now) return "; it is now " + known;
     }
   }
   const auto nearest = std::min_element(known_.begin(), known_.end(), [&](const auto& a, const auto& b) {
     return edit_distance(name, last_name(a)) < edit_distance(name, last_name(b));
   });
   const bool is_near = nearest != known_.end() && edit_distance(name, last_name(*nearest)) <= 1 + name.size() / 3;
-  return is_near ? "; did you mean " + prefix_ + *nearest + "?" : "";
+  return is_near ? "; did you mean " + *nearest + "?" : "";
 }
 
 void ParameterReader::find_unknown(const YAML::Node& map, const std::string& prefix,

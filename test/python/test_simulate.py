@@ -239,7 +239,7 @@ class SimulateTest(unittest.TestCase):
         for name in ("nowhere", "paper_field", "downtown_grid", "tunnel"):
             self.assertIn(name, output)
         self.assertIn("imu.rat: no such parameter", self.refuse("--scenario", "open_sky", "--set", "imu.rat=3"))
-        self.assertIn("GROUP.NAME=VALUE", self.refuse("--scenario", "open_sky", "--set", "imu"))
+        self.assertIn("SECTION.NAME=VALUE", self.refuse("--scenario", "open_sky", "--set", "imu"))
         self.assertNotEqual(run("--scenario", "open_sky", "--duration", "-1").returncode, 0)
 
 

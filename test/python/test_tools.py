@@ -114,7 +114,7 @@ class ToolTest(unittest.TestCase):
         output = self.refuse("paper_experiment", "--set", "particle_filter.expert.ring_share=2", "--set",
                              "gps_bias.expert.bias_filter.shadow_sigm=1")
         self.assertIn("particle_filter.expert.ring_share = 2", output)
-        self.assertIn("did you mean gps_bias.expert.bias_filter.shadow_sigma?", output)
+        self.assertIn("did you mean expert.bias_filter.shadow_sigma?", output)
 
     def test_recording_through_all_tools(self):
         write_recording(self.directory)

@@ -89,7 +89,7 @@ class ComplementaryEkfTest(unittest.TestCase):
                                "_expert/detector/gate_probability:=1.5", "_expert/close_coun:=3"], stdout=subprocess.PIPE,
                               stderr=subprocess.STDOUT, universal_newlines=True, timeout=30)
         self.assertEqual(done.returncode, 1, done.stdout)
-        for fault in ("standard, gated, compensated", "gate_probability = 1.5", "did you mean close_count?"):
+        for fault in ("standard, gated, compensated", "gate_probability = 1.5", "did you mean expert.close_count?"):
             self.assertIn(fault, done.stdout)
         rospy.delete_param("tested")
 

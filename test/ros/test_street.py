@@ -172,7 +172,7 @@ class StreetTest(unittest.TestCase):
         process = self.loader("/bad", "_expert/voxels/voxel_size:=-1.0", "_model:=best", "_windw:=3.0")
         output, _ = process.communicate(timeout=30)
         self.assertNotEqual(process.returncode, 0, output)
-        for fault in ("voxel_size = -1", "conventional", "did you mean window?"):
+        for fault in ("voxel_size = -1", "conventional", "did you mean expert.voxels.window?"):
             self.wait_for_log("/manager", fault)
         self.assertEqual(self.services_of("/bad"), [])
         self.feed(5, cloud=WALL)

@@ -144,9 +144,10 @@ TEST(PaperField, FilesDefaultsAreTheStructs) {
   const YAML::Node file = YAML::LoadFile(package_directory() + "/config/paper_field/simulator.yaml");
   PaperFieldParameters field;
   MotionParameters motion;
-  ParameterReader reader(file);
+  ParameterReader reader(file, "", "", Layout::kTiered);
   reader.ignore("field");
-  EXPECT_TRUE(reader.read(field).read(motion).finish().empty());
+  WithMotion with_motion{field, motion};
+  EXPECT_TRUE(reader.read(with_motion).finish().empty());
   const PaperFieldParameters defaults;
   EXPECT_EQ(field.targets(), defaults.targets());
   EXPECT_NEAR(field.fix_shadow_sigma, defaults.fix_shadow_sigma, 1e-8);

@@ -263,7 +263,7 @@ TEST_F(ScenarioTest, BadOverridesAreRefused) {
   EXPECT_TRUE(says(refusal(kRoute, {"imu.rate=fast"}), "imu.rate = fast: must be a number"));
   EXPECT_TRUE(says(refusal(kRoute, {"imu.rat=5"}), "imu.rat: no such parameter; did you mean rate?"));
   EXPECT_TRUE(says(refusal(kRoute, {"lidarr.rate=5"}), "lidarr: no such parameter; did you mean lidar?"));
-  EXPECT_TRUE(says(refusal(kRoute, {"route.speed.now=5"}), "route.speed.now: no such parameter"));
+  EXPECT_TRUE(says(refusal(kRoute, {"route.speed.now=5"}), "route.speed = {now: 5}: must be a number"));
   const std::string two = refusal(kRoute, {"imu.rate=-1", "seed=x"});
   EXPECT_EQ(fault_count(two), 2u) << two;
   // A name below what is no section.
