@@ -47,7 +47,7 @@ class InstalledTreeTest(unittest.TestCase):
                            "export ROS_MASTER_URI=http://localhost:11399; "
                            "timeout 60 bash -c 'until rostopic list > topics 2> /dev/null; do sleep 0.5; done; "
                            "rostopic echo -n 20 /odometry/filtered > poses'; status=$?; "
-                           "kill -INT $launch; wait $launch; exit $status".format(PACKAGE))
+                           "kill -TERM $launch; wait $launch; exit $status".format(PACKAGE))
         with open(os.path.join(self.directory, "poses")) as file:
             self.assertEqual(file.read().count("child_frame_id"), 20)
 
