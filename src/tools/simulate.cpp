@@ -16,11 +16,12 @@
 #include "find_scenario.hpp"
 #include "output_file.hpp"
 #include "urban_gnss_localization/common/progress.hpp"
+#include "urban_gnss_localization/parameters/assignment.hpp"
 #include "urban_gnss_localization/parameters/parameter_reader.hpp"
-#include "urban_gnss_localization/simulation_ros/simulation_messages.hpp"
 #include "urban_gnss_localization/simulation/city_simulator.hpp"
 #include "urban_gnss_localization/simulation/paper_field_simulator.hpp"
 #include "urban_gnss_localization/simulation/simulation_statistics.hpp"
+#include "urban_gnss_localization/simulation_ros/simulation_messages.hpp"
 
 namespace fs = std::filesystem;
 using namespace urban_gnss;
@@ -85,13 +86,8 @@ Run make_city(const fs::path& file, const SimulationFrames& frames, const Option
 
 Run make_run(const Options& options, const SimulationFrames& frames) {
   const fs::path file = find_scenario(options.scenario);
-  YAML::Node values;
-  try {
-    values = YAML::LoadFile(file.string());
-  } catch (const YAML::ParserException& error) {
-    throw std::runtime_error(file.string() + ":" + std::to_string(error.mark.line + 1) + ": " + error.msg);
-  }
-  const bool is_paper_field = values.IsMap() && values["field"].IsDefined();
+  const YAML::Node values = load_map(file.string());
+  const bool is_paper_field = values["field"].IsDefined();
   Run run = is_paper_field ? make_paper_field(file, values, options) : make_city(file, frames, options);
   run.name = file.stem() == "simulator" ? file.parent_path().filename().string() : file.stem().string();
   return run;
@@ -196,7 +192,8 @@ void run(const Options& options) {
 
 int main(int argc, char** argv) {
   Options options;
-  CommandLine line("simulate", "Drives a scenario offline: a bag of what the sensors publish, and how the receiver did.");
+  CommandLine line("simulate",
+                   "Drives a scenario offline: a bag of what the sensors publish, and how the receiver did.");
   line.app()
       .add_option("--scenario", options.scenario, "a scenario's file, or the name of one that comes with the package")
       ->required();
