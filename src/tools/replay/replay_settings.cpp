@@ -1,22 +1,19 @@
 #include "replay_settings.hpp"
 
 #include <algorithm>
-#include <stdexcept>
+#include <optional>
 
-#include "urban_gnss_localization/parameters/assignment.hpp"
+#include "overrides.hpp"
 #include "urban_gnss_localization/parameters/parameter_list.hpp"
-#include "urban_gnss_localization/parameters/parameter_reader.hpp"
 
 namespace urban_gnss {
 namespace {
 
 constexpr const char* kGpsBias = "gps_bias";
-constexpr const char* kSeed = "seed";
 
 /// The parameters by node, as they come together.
 struct Maps {
-  std::string localizer;  ///< its name
-  std::string entry;      ///< that of its node
+  std::string entry;  ///< name of the localizer's node
   YAML::Node of_localizer{YAML::NodeType::Map};
   YAML::Node of_gps_bias{YAML::NodeType::Map};
 };
@@ -43,11 +40,11 @@ void assign_option(const std::string& text, Maps& maps) {
   }
 }
 
-template <class P>
-void read(const YAML::Node& map, const std::string& whose, P& parameters, std::vector<std::string>& faults) {
-  ParameterReader reader(map, "", "", Layout::kTiered);
-  reader.ignore("diagnostic_period");  // of the live node alone
-  for (const std::string& fault : reader.read(parameters).finish()) faults.push_back(whose + fault);
+/// The seed of the localizer's random numbers; nothing where it draws none.
+std::optional<ListedParameter> find_seed(const LocalizerNodeSettings& localizer) {
+  const std::vector<ListedParameter> all = ParameterList().add(localizer).parameters();
+  const auto found = std::find_if(all.begin(), all.end(), [](const auto& each) { return each.name == "seed"; });
+  return found == all.end() ? std::nullopt : std::make_optional(*found);
 }
 
 }  // namespace
@@ -55,30 +52,28 @@ void read(const YAML::Node& map, const std::string& whose, P& parameters, std::v
 ReplaySettings read_settings(const ReplayOptions& options, const LocalizerRegistry& localizers) {
   const LocalizerChoice choice = localizers.choose(options.localizer);
   ReplaySettings settings{LocalizerNodeSettings(*choice.entry), {}};
-  Maps maps{options.localizer, choice.entry->name};
+  Maps maps{choice.entry->name};
   for (const std::string& file : options.params) merge_file(file, localizers, maps);
   for (const std::string& text : choice.assignments) assign(maps.of_localizer, text);
   if (options.wants_imu) assign(maps.of_localizer, "expert.imu.use_imu_yaw_rate=true");
   for (const std::string& text : options.overrides) assign_option(text, maps);
-  const std::vector<ListedParameter> known = ParameterList().add(settings.localizer).parameters();
-  const auto seed = std::find_if(known.begin(), known.end(), [](const auto& each) { return each.name == kSeed; });
-  if (seed != known.end() && options.seed >= 0) {
+  const auto seed = find_seed(settings.localizer);
+  if (seed && options.seed >= 0) {
     assign(maps.of_localizer, seed->path(Layout::kTiered) + "=" + std::to_string(options.seed));
   }
   if (!options.datum.empty()) maps.of_localizer["datum"] = options.datum;
 
-  std::vector<std::string> faults;
-  read(maps.of_localizer, "", settings.localizer, faults);
+  // Of the live nodes alone.
+  for (YAML::Node map : {maps.of_localizer, maps.of_gps_bias}) map.remove("diagnostic_period");
+
+  std::vector<std::string> faults = read_tiered(maps.of_localizer, "", settings.localizer);
   // What both nodes are told alike is told once: to the localizer.
   settings.gps_bias.frames = settings.localizer.shell.frames;
   settings.gps_bias.bias.input = settings.localizer.shell.localization.input;
-  read(maps.of_gps_bias, std::string(kGpsBias) + ".", settings.gps_bias, faults);
+  const auto of_gps_bias = read_tiered(maps.of_gps_bias, std::string(kGpsBias) + ".", settings.gps_bias);
+  faults.insert(faults.end(), of_gps_bias.begin(), of_gps_bias.end());
   if (!faults.empty()) throw ParameterError("replay", faults);
-  ParameterList read_list;
-  read_list.add(settings.localizer);
-  for (const ListedParameter& each : read_list.parameters()) {
-    if (each.name == kSeed) settings.seed = std::stoi(each.value);
-  }
+  if (seed) settings.seed = std::stoi(find_seed(settings.localizer)->value);
   return settings;
 }
 
