@@ -12,13 +12,11 @@
 #include <iostream>
 #include <nlohmann/json.hpp>
 #include <sstream>
-#include <thread>
 
 #include "command_line.hpp"
-#include "find_scenario.hpp"
 #include "output_file.hpp"
 #include "overrides.hpp"
-#include "parallel_jobs.hpp"
+#include "scenario_runs.hpp"
 #include "urban_gnss_localization/evaluation/report_json.hpp"
 #include "urban_gnss_localization/evaluation/statistics.hpp"
 #include "urban_gnss_localization/evaluation/trajectory_errors.hpp"
@@ -32,14 +30,10 @@ namespace {
 constexpr std::array<const char*, 3> kPhases{"before", "between", "after"};  ///< as phase_of counts
 
 struct Options {
-  std::vector<std::string> scenarios{"building_pass", "open_sky"};
-  int seeds = 10;
-  int first_seed = 1;
+  ScenarioRuns runs{{"building_pass", "open_sky"}};
   std::vector<std::string> overrides;
-  std::vector<std::string> scenario_overrides;
   std::string json_file;
   std::string plots;
-  int jobs = 1;
 };
 
 nlohmann::json contestant_json(const std::vector<BiasRun>& runs, std::size_t contestant) {
@@ -186,28 +180,20 @@ void run_all(const Options& options, const std::string& command) {
   BiasExperimentConditions conditions;
   read_overrides("--set", YAML::Node(YAML::NodeType::Map), options.overrides, conditions.filter,
                  conditions.localization);
-  const auto seeds = static_cast<std::size_t>(options.seeds);
-  std::vector<std::vector<BiasRun>> results(options.scenarios.size(), std::vector<BiasRun>(seeds));
   const auto start = std::chrono::steady_clock::now();
-  const auto label = [&](std::size_t index) { return options.scenarios[index / seeds]; };
-  run_jobs(results.size() * seeds, options.jobs, label,
-           [&](std::size_t index, const std::function<void(double)>& on_progress) {
-             const std::size_t i = index / seeds;
-             const std::size_t s = index % seeds;
-             std::vector<std::string> overrides = options.scenario_overrides;
-             overrides.push_back("seed=" + std::to_string(options.first_seed + static_cast<int>(s)));
-             overrides.push_back("lidar.type=none");
-             const Scenario scenario = load_scenario(find_scenario(options.scenarios[i]).string(), overrides);
-             results[i][s] = run_bias_experiment(scenario, conditions);
-             on_progress(1.0);
-           });
+  const std::vector<std::vector<BiasRun>> results =
+      run_scenarios(options.runs, [&](const Scenario& scenario, const std::function<void(double)>& on_progress) {
+        BiasRun run = run_bias_experiment(scenario, conditions);
+        on_progress(1.0);
+        return run;
+      });
 
   nlohmann::json metrics;
   metrics["command"] = command;
   metrics["wall_s"] = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  for (std::size_t s = 0; s < seeds; ++s) metrics["seeds"].push_back(options.first_seed + static_cast<int>(s));
-  for (std::size_t i = 0; i < options.scenarios.size(); ++i) {
-    const std::string name = fs::path(options.scenarios[i]).stem().string();
+  metrics["seeds"] = options.runs.seeds();
+  for (std::size_t i = 0; i < results.size(); ++i) {
+    const std::string name = fs::path(options.runs.scenarios[i]).stem().string();
     metrics["scenario_order"].push_back(name);
     metrics["scenarios"][name] = scenario_json(results[i]);
     print(name, metrics["scenarios"][name]);
@@ -228,11 +214,11 @@ int main(int argc, char** argv) {
   Options options;
   CommandLine line("bias_experiment",
                    "Figure 6 of Kim et al. on simulated scenarios: every filter on the same measurements.");
-  line.add_scenarios(options.scenarios, options.scenario_overrides);
-  line.add_seeds(options.seeds, options.first_seed);
+  line.add_scenarios(options.runs.scenarios, options.runs.overrides);
+  line.add_seeds(options.runs.seed_count, options.runs.first_seed);
   line.add_set("--set", options.overrides, "a parameter of complementary_ekf or localization");
   line.add_json(options.json_file);
   line.app().add_option("--plots", options.plots, "write figure, table and their data into this folder");
-  line.add_jobs(options.jobs);
+  line.add_jobs(options.runs.jobs);
   return line.run(argc, argv, [&] { run_all(options, line.command()); });
 }

@@ -13,10 +13,9 @@
 #include <sstream>
 
 #include "command_line.hpp"
-#include "find_scenario.hpp"
 #include "output_file.hpp"
 #include "overrides.hpp"
-#include "parallel_jobs.hpp"
+#include "scenario_runs.hpp"
 #include "urban_gnss_localization/evaluation/report_json.hpp"
 #include "urban_gnss_localization/geometry/angles.hpp"
 #include "urban_gnss_localization/localizers/registry.hpp"
@@ -30,15 +29,10 @@ namespace {
 const std::string kWithOcclusion = "+occlusion";
 
 struct Options {
-  std::vector<std::string> scenarios{"downtown_grid", "campus_loop", "building_pass", "open_sky", "tunnel"};
+  ScenarioRuns runs{{"downtown_grid", "campus_loop", "building_pass", "open_sky", "tunnel"}};
   std::vector<std::string> localizers;
-  int seeds = 10;
-  int first_seed = 1;
-  double duration_s = 0.0;
   std::vector<std::string> overrides;
-  std::vector<std::string> scenario_overrides;
   std::string json_file;
-  int jobs = 1;
 };
 
 /// All variants of the registry, and after each that gains from it the same behind the occlusion node.
@@ -139,27 +133,18 @@ void run_all(const Options& options, const std::string& command) {
   const YAML::Node sections = read_sections(options.overrides, standard_localizers());
   const LocalizerExperimentConditions conditions = read_conditions(sections);
   const std::vector<Contender> contenders = select_contenders(options, sections);
-  const auto seeds = static_cast<std::size_t>(options.seeds);
-  std::vector<std::vector<LocalizerRun>> runs(options.scenarios.size(), std::vector<LocalizerRun>(seeds));
   const auto start = std::chrono::steady_clock::now();
-  const auto label = [&](std::size_t index) { return options.scenarios[index / seeds]; };
-  run_jobs(runs.size() * seeds, options.jobs, label,
-           [&](std::size_t index, const std::function<void(double)>& on_progress) {
-             const std::size_t i = index / seeds;
-             const std::size_t s = index % seeds;
-             std::vector<std::string> overrides = options.scenario_overrides;
-             overrides.push_back("seed=" + std::to_string(options.first_seed + static_cast<int>(s)));
-             if (options.duration_s > 0.0) overrides.push_back("duration=" + std::to_string(options.duration_s));
-             const Scenario scenario = load_scenario(find_scenario(options.scenarios[i]).string(), overrides);
-             runs[i][s] = run_localizer_experiment(scenario, contenders, conditions, on_progress);
-           });
+  const std::vector<std::vector<LocalizerRun>> runs =
+      run_scenarios(options.runs, [&](const Scenario& scenario, const std::function<void(double)>& on_progress) {
+        return run_localizer_experiment(scenario, contenders, conditions, on_progress);
+      });
 
   nlohmann::json metrics;
   metrics["command"] = command;
   metrics["wall_s"] = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  for (std::size_t s = 0; s < seeds; ++s) metrics["seeds"].push_back(options.first_seed + static_cast<int>(s));
+  metrics["seeds"] = options.runs.seeds();
   for (std::size_t i = 0; i < runs.size(); ++i) {
-    const std::string name = fs::path(options.scenarios[i]).stem().string();
+    const std::string name = fs::path(options.runs.scenarios[i]).stem().string();
     std::cout << "\n== " << name << '\n'
               << std::left << std::setw(28) << "position error, m" << std::right
               << "     rmse   median      p95      max  heading, deg     NEES  coverage  diverged  back after\n";
@@ -184,15 +169,15 @@ int main(int argc, char** argv) {
   Options options;
   options.localizers = default_localizers(standard_localizers());
   CommandLine line("localizer_experiment", "Localizers on simulated scenarios, with their errors against the truth.");
-  line.add_scenarios(options.scenarios, options.scenario_overrides);
+  line.add_scenarios(options.runs.scenarios, options.runs.overrides);
   line.app()
       .add_option("--localizers", options.localizers,
                   "comma-separated; NAME" + kWithOcclusion + ": with the covariances of the occlusion node")
       ->delimiter(',');
-  line.add_seeds(options.seeds, options.first_seed);
-  line.add_duration(options.duration_s);
+  line.add_seeds(options.runs.seed_count, options.runs.first_seed);
+  line.add_duration(options.runs.duration_s);
   line.add_set("--set", options.overrides, "after localization., occlusion., gps_bias. or LOCALIZER., a parameter");
   line.add_json(options.json_file);
-  line.add_jobs(options.jobs);
+  line.add_jobs(options.runs.jobs);
   return line.run(argc, argv, [&] { run_all(options, line.command()); });
 }

@@ -12,14 +12,13 @@
 #include <iostream>
 #include <nlohmann/json.hpp>
 #include <sstream>
-#include <thread>
 
 #include "command_line.hpp"
 #include "find_scenario.hpp"
 #include "occlusion_series.hpp"
 #include "output_file.hpp"
 #include "overrides.hpp"
-#include "parallel_jobs.hpp"
+#include "scenario_runs.hpp"
 #include "urban_gnss_localization/evaluation/report_json.hpp"
 #include "urban_gnss_localization/evaluation/statistics.hpp"
 #include "urban_gnss_localization/geometry/angles.hpp"
@@ -33,18 +32,13 @@ namespace {
 constexpr double kBadFix_m = 6.0;  ///< horizontal error from which a fix is bad; sigma_thresh of the paper
 
 struct Options {
-  std::vector<std::string> scenarios{"campus_loop", "building_pass", "downtown_grid", "open_sky"};
-  int seeds = 10;
-  int first_seed = 1;
-  double duration_s = 0.0;
+  ScenarioRuns runs{{"campus_loop", "building_pass", "downtown_grid", "open_sky"}};
   int cloud_every = 5;
   std::string occlusion_file;
   std::vector<std::string> occlusion_overrides;
   std::vector<std::string> ukf_overrides;
-  std::vector<std::string> scenario_overrides;
   std::string json_file;
   std::string series_directory;
-  int jobs = 1;
 };
 
 OcclusionExperimentConditions read_conditions(const Options& options) {
@@ -240,27 +234,18 @@ void print(const std::string& scenario, const nlohmann::json& json) {
 
 void run_all(const Options& options, const std::string& command) {
   const OcclusionExperimentConditions conditions = read_conditions(options);
-  const auto seeds = static_cast<std::size_t>(options.seeds);
-  std::vector<std::vector<OcclusionRun>> results(options.scenarios.size(), std::vector<OcclusionRun>(seeds));
   const auto start = std::chrono::steady_clock::now();
-  const auto label = [&](std::size_t index) { return options.scenarios[index / seeds]; };
-  run_jobs(results.size() * seeds, options.jobs, label,
-           [&](std::size_t index, const std::function<void(double)>& on_progress) {
-             const std::size_t i = index / seeds;
-             const std::size_t s = index % seeds;
-             std::vector<std::string> overrides = options.scenario_overrides;
-             overrides.push_back("seed=" + std::to_string(options.first_seed + static_cast<int>(s)));
-             if (options.duration_s > 0.0) overrides.push_back("duration=" + std::to_string(options.duration_s));
-             const Scenario scenario = load_scenario(find_scenario(options.scenarios[i]).string(), overrides);
-             results[i][s] = run_occlusion_experiment(scenario, conditions, on_progress);
-           });
+  const std::vector<std::vector<OcclusionRun>> results =
+      run_scenarios(options.runs, [&](const Scenario& scenario, const std::function<void(double)>& on_progress) {
+        return run_occlusion_experiment(scenario, conditions, on_progress);
+      });
 
   nlohmann::json metrics;
   metrics["command"] = command;
   metrics["wall_s"] = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  for (std::size_t s = 0; s < seeds; ++s) metrics["seeds"].push_back(options.first_seed + static_cast<int>(s));
-  for (std::size_t i = 0; i < options.scenarios.size(); ++i) {
-    const std::string name = fs::path(options.scenarios[i]).stem().string();
+  metrics["seeds"] = options.runs.seeds();
+  for (std::size_t i = 0; i < results.size(); ++i) {
+    const std::string name = fs::path(options.runs.scenarios[i]).stem().string();
     metrics["scenarios"][name] = scenario_json(results[i]);
     print(name, metrics["scenarios"][name]);
     if (!options.series_directory.empty()) write_series(options.series_directory, name, results[i].front());
@@ -274,9 +259,9 @@ void run_all(const Options& options, const std::string& command) {
 int main(int argc, char** argv) {
   Options options;
   CommandLine line("occlusion_experiment", "Tables I and II of Maier and Kleiner (2010) on simulated scenarios.");
-  line.add_scenarios(options.scenarios, options.scenario_overrides);
-  line.add_seeds(options.seeds, options.first_seed);
-  line.add_duration(options.duration_s);
+  line.add_scenarios(options.runs.scenarios, options.runs.overrides);
+  line.add_seeds(options.runs.seed_count, options.runs.first_seed);
+  line.add_duration(options.runs.duration_s);
   line.app()
       .add_option("--cloud-every", options.cloud_every, "of a spinning lidar's scans, use one in so many")
       ->check(CLI::PositiveNumber);
@@ -287,6 +272,6 @@ int main(int argc, char** argv) {
   line.add_json(options.json_file);
   line.app().add_option("--series", options.series_directory,
                         "write the first seed's fixes and trajectories here as CSV, for figures");
-  line.add_jobs(options.jobs);
+  line.add_jobs(options.runs.jobs);
   return line.run(argc, argv, [&] { run_all(options, line.command()); });
 }
