@@ -2,6 +2,8 @@
 
 #include <Eigen/Dense>
 #include <functional>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "matchers.hpp"
@@ -18,6 +20,44 @@ const char* const kTextbookNoise =
     "yaw_rate_bias_walk: 3.0e-5, direct_time: 60.0, slow_bias_time: 20.0, fast_bias_time: 1.0, bias_end_time: 60.0, "
     "jump_share: 0.9, slow_bias_walk: 0.2, fast_bias_walk: 1.0, jump_sigma: 20.0, onset_sigma: 0.5, "
     "outlier_share: 0.01, outlier_radius: 200.0}";
+
+/// A change of a parameter, and what else is set for it to have an effect: YAML over the textbook's values.
+using ParameterChange = std::pair<std::string, std::string>;
+
+/// Of the parameters that the filters of the switching model have alike, each with an effect on a drive with a bias.
+inline std::vector<ParameterChange> switching_model_changes() {
+  return {
+      {"use_fix_covariance: false", "{}"},
+      {"direct_sigma: 1.0", "{}"},
+      {"shadow_sigma: 1.0", "{}"},
+      {"direct_time: 20.0", "{}"},
+      {"slow_bias_time: 5.0", "{}"},
+      {"fast_bias_time: 3.0", "{}"},
+      {"bias_end_time: 5.0", "{}"},
+      {"jump_share: 0.5", "{}"},
+      {"slow_bias_walk: 0.5", "{}"},
+      {"fast_bias_walk: 3.0", "{}"},
+      {"jump_sigma: 5.0", "{}"},
+      {"onset_sigma: 1.0", "{}"},
+      {"outlier_share: 0.1", "{}"},
+      {"outlier_radius: 20.0", "{}"},
+      {"motion_noise_factor: 1.0", "{}"},
+      {"speed_scale_sigma: 0.01", "{}"},
+      {"speed_scale_walk: 0.01", "{}"},
+      {"yaw_rate_bias_sigma: 0.01", "{}"},
+      {"yaw_rate_bias_walk: 0.001", "{}"},
+      {"position_walk: 0.2", "{}"},
+      {"heading_walk: 0.05", "{}"},
+      {"bias_fade_time: 5.0", "{}"},
+      {"student_dof: 2.0", "{}"},
+      {"fix_scale_rate: 0.1", "{}"},
+      {"fix_correlation_time: 2.0", "{}"},
+      {"fix_scale_limit: 1.05", "fix_scale_rate: 0.1"},
+      {"fix_scale_lag: 0.0", "fix_scale_rate: 0.1"},
+      {"first_fix_scale: 3.0", "fix_scale_rate: 0.1"},
+      {"yaw_rate_scale_sigma: 0.02", "{}"},
+  };
+}
 
 /// A robot on a loop with odometry that is wrong by scale and bias, and fixes with a bias of the test's choosing.
 struct SwitchingDrive {

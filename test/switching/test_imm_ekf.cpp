@@ -285,37 +285,7 @@ TEST(ImmEkf, LeverArmIsInTheAntennasPlace) {
 }
 
 TEST(ImmEkf, EveryParameterHasAnEffect) {
-  const std::vector<std::pair<std::string, std::string>> changes = {
-      {"use_fix_covariance: false", "{}"},
-      {"direct_sigma: 1.0", "{}"},
-      {"shadow_sigma: 1.0", "{}"},
-      {"direct_time: 20.0", "{}"},
-      {"slow_bias_time: 5.0", "{}"},
-      {"fast_bias_time: 3.0", "{}"},
-      {"bias_end_time: 5.0", "{}"},
-      {"jump_share: 0.5", "{}"},
-      {"slow_bias_walk: 0.5", "{}"},
-      {"fast_bias_walk: 3.0", "{}"},
-      {"jump_sigma: 5.0", "{}"},
-      {"onset_sigma: 1.0", "{}"},
-      {"outlier_share: 0.1", "{}"},
-      {"outlier_radius: 20.0", "{}"},
-      {"motion_noise_factor: 1.0", "{}"},
-      {"speed_scale_sigma: 0.01", "{}"},
-      {"speed_scale_walk: 0.01", "{}"},
-      {"yaw_rate_bias_sigma: 0.01", "{}"},
-      {"yaw_rate_bias_walk: 0.001", "{}"},
-      {"position_walk: 0.2", "{}"},
-      {"heading_walk: 0.05", "{}"},
-      {"bias_fade_time: 5.0", "{}"},
-      {"student_dof: 2.0", "{}"},
-      {"fix_scale_rate: 0.1", "{}"},
-      {"fix_correlation_time: 2.0", "{}"},
-      {"fix_scale_limit: 1.05", "fix_scale_rate: 0.1"},
-      {"fix_scale_lag: 0.0", "fix_scale_rate: 0.1"},
-      {"first_fix_scale: 3.0", "fix_scale_rate: 0.1"},
-      {"yaw_rate_scale_sigma: 0.02", "{}"},
-  };
+  const std::vector<ParameterChange> changes = switching_model_changes();
   // Elsewhere: those of a parked robot, common_error_sigma, fix_covariance_weight, the velocity's and the ranges'.
   EXPECT_EQ(changes.size() + 4 + parameter_names(VelocityNoiseParameters{}).size() +
                 parameter_names(RangeFixParameters{}).size(),
