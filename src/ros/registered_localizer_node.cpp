@@ -1,14 +1,9 @@
 #include "urban_gnss_localization/ros/registered_localizer_node.hpp"
 
-#include "urban_gnss_localization/localizers/particle_localizer.hpp"
 #include "urban_gnss_localization/localizers/registry.hpp"
 #include "urban_gnss_localization/ros/node_parameters.hpp"
 
 namespace urban_gnss {
-
-LocalizerNodeSettings::LocalizerNodeSettings(const LocalizerEntry& entry)
-    : localizer(entry.settings()),
-      has_particles(dynamic_cast<const ParticleLocalizer*>(localizer->make().get()) != nullptr) {}
 
 RegisteredLocalizerNode::RegisteredLocalizerNode(ros::NodeHandle& node, ros::NodeHandle& private_node,
                                                  const LocalizerEntry& entry) {

@@ -3,10 +3,13 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "urban_gnss_localization/common/parameters.hpp"
 #include "urban_gnss_localization/localizers/localizer.hpp"
+#include "urban_gnss_localization/localizers/particle_localizer.hpp"
 #include "urban_gnss_localization/motion/motion_model.hpp"
 
 namespace urban_gnss {
@@ -25,6 +28,8 @@ class LocalizerSettings {
 template <class L, class P>
 class SettingsWithMotion : public LocalizerSettings {
  public:
+  using Made = L;
+
   void visit(ParameterVisitor& v) override { WithMotion<P>{filter_, motion_}.visit(v); }
   std::unique_ptr<Localizer> make() const override { return std::make_unique<L>(filter_, motion_); }
 
@@ -49,6 +54,17 @@ struct LocalizerEntry {
   /// The parameters that several localizers have alike stand once, in config/shared_parameters.yaml; empty: it shares
   /// none.
   std::string shared_parameters{};
+  bool has_particles{false};  ///< it is a ParticleLocalizer
 };
+
+/// The entry of the localizer Settings::Made, whose LocalizerSettings are Settings.
+template <class Settings>
+LocalizerEntry make_entry(std::string name, std::string summary, std::vector<LocalizerVariant> variants,
+                          std::string shared_parameters = "") {
+  LocalizerEntry entry{std::move(name), std::move(summary), std::make_unique<Settings>, std::move(variants),
+                       std::move(shared_parameters)};
+  entry.has_particles = std::is_base_of_v<ParticleLocalizer, typename Settings::Made>;
+  return entry;
+}
 
 }  // namespace urban_gnss

@@ -30,11 +30,12 @@ class RegisteredLocalizerNode {
 
 /// What a localizer's node reads, with its defaults: for documentation and for the YAML files.
 struct LocalizerNodeSettings {
-  explicit LocalizerNodeSettings(const LocalizerEntry& entry);
+  explicit LocalizerNodeSettings(const LocalizerEntry& entry)
+      : localizer(entry.settings()), has_particles(entry.has_particles) {}
 
   LocalizerNodeParameters shell;
   std::shared_ptr<LocalizerSettings> localizer;
-  bool has_particles{false};
+  bool has_particles;
   ParticlePublisherParameters particles;
 
   void visit(ParameterVisitor& v) {

@@ -6,6 +6,8 @@ namespace {
 
 class ComplementaryEkfSettings : public LocalizerSettings {
  public:
+  using Made = ComplementaryEkf;
+
   void visit(ParameterVisitor& v) override { v.include(filter_); }
   std::unique_ptr<Localizer> make() const override { return std::make_unique<ComplementaryEkf>(filter_); }
 
@@ -16,10 +18,10 @@ class ComplementaryEkfSettings : public LocalizerSettings {
 }  // namespace
 
 LocalizerEntry complementary_ekf_entry() {
-  return {"complementary_ekf",
-          "Kim et al.: a complementary EKF whose bias filter opens where the fixes contradict the odometry.",
-          std::make_unique<ComplementaryEkfSettings>,
-          {{"ekf", {"mode=standard"}}, {"gated_ekf", {"mode=gated"}}, {"complementary_ekf", {"mode=compensated"}}}};
+  return make_entry<ComplementaryEkfSettings>(
+      "complementary_ekf",
+      "Kim et al.: a complementary EKF whose bias filter opens where the fixes contradict the odometry.",
+      {{"ekf", {"mode=standard"}}, {"gated_ekf", {"mode=gated"}}, {"complementary_ekf", {"mode=compensated"}}});
 }
 
 }  // namespace urban_gnss

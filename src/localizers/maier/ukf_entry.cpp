@@ -4,10 +4,9 @@
 namespace urban_gnss {
 
 LocalizerEntry ukf_entry() {
-  return {"ukf",
-          "Maier and Kleiner: an unscented Kalman filter, behind occlusion_node or on its own.",
-          std::make_unique<SettingsWithMotion<Ukf, UkfParameters>>,
-          {{"ukf", {}, true}}};
+  return make_entry<SettingsWithMotion<Ukf, UkfParameters>>(
+      "ukf", "Maier and Kleiner: an unscented Kalman filter, behind occlusion_node or on its own.",
+      {{"ukf", {}, true}});
 }
 
 }  // namespace urban_gnss

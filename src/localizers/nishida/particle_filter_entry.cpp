@@ -4,10 +4,10 @@
 namespace urban_gnss {
 
 LocalizerEntry particle_filter_entry() {
-  return {"particle_filter",
-          "Nishida et al.: a particle filter that uses the length of the bias, which gps_bias_node tracks.",
-          std::make_unique<SettingsWithMotion<ParticleFilter, ParticleFilterParameters>>,
-          {{"paper", {"mode=paper"}}}};
+  return make_entry<SettingsWithMotion<ParticleFilter, ParticleFilterParameters>>(
+      "particle_filter",
+      "Nishida et al.: a particle filter that uses the length of the bias, which gps_bias_node tracks.",
+      {{"paper", {"mode=paper"}}});
 }
 
 }  // namespace urban_gnss

@@ -4,11 +4,10 @@
 namespace urban_gnss {
 
 LocalizerEntry imm_ekf_entry() {
-  return {"imm_ekf",
-          "Our own: interacting multiple models of a bias that comes and goes; the odometry's errors are states.",
-          std::make_unique<SettingsWithMotion<ImmEkf, ImmEkfParameters>>,
-          {{"imm_ekf", {}, true}},
-          "switching_model"};
+  return make_entry<SettingsWithMotion<ImmEkf, ImmEkfParameters>>(
+      "imm_ekf",
+      "Our own: interacting multiple models of a bias that comes and goes; the odometry's errors are states.",
+      {{"imm_ekf", {}, true}}, "switching_model");
 }
 
 }  // namespace urban_gnss

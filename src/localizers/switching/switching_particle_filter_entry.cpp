@@ -4,11 +4,9 @@
 namespace urban_gnss {
 
 LocalizerEntry switching_particle_filter_entry() {
-  return {"switching_particle_filter",
-          "The model of imm_ekf with particles, for a start whose heading is unknown.",
-          std::make_unique<SettingsWithMotion<SwitchingParticleFilter, SwitchingParticleFilterParameters>>,
-          {{"switching", {}, true}},
-          "switching_model"};
+  return make_entry<SettingsWithMotion<SwitchingParticleFilter, SwitchingParticleFilterParameters>>(
+      "switching_particle_filter", "The model of imm_ekf with particles, for a start whose heading is unknown.",
+      {{"switching", {}, true}}, "switching_model");
 }
 
 }  // namespace urban_gnss

@@ -37,7 +37,7 @@ class Dummy : public Localizer {
 };
 
 LocalizerEntry dummy_entry() {
-  return {"dummy", "Dead reckoning.", std::make_unique<SettingsWithMotion<Dummy, DummyParameters>>, {{"dummy", {}}}};
+  return make_entry<SettingsWithMotion<Dummy, DummyParameters>>("dummy", "Dead reckoning.", {{"dummy", {}}});
 }
 
 }  // namespace
