@@ -103,20 +103,6 @@ class Dispatcher {
 
 }  // namespace
 
-std::vector<SatelliteObservation> to_observations(const std::vector<SatelliteReport>& reports) {
-  std::vector<SatelliteObservation> observations;
-  for (const SatelliteReport& report : reports) {
-    SatelliteObservation observation;
-    observation.id = report.id;
-    observation.look = report.look;
-    observation.cn0_dbhz = report.cn0_dbhz;
-    observation.tracked = report.is_tracked;
-    observation.residual_m = report.residual_m;
-    observations.push_back(observation);
-  }
-  return observations;
-}
-
 DriveRecord drive_city(Scenario scenario, int cloud_every, const std::vector<DriveParticipant*>& participants,
                        const std::function<void(double)>& on_progress) {
   if (std::none_of(participants.begin(), participants.end(), [](const auto* each) { return each->wants_clouds(); })) {

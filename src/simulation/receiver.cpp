@@ -36,6 +36,20 @@ void ReceiverParameters::check(std::vector<std::string>& faults) const {
   if (!(latency_min <= latency_max)) faults.push_back("latency_min: must be at most latency_max");
 }
 
+std::vector<SatelliteObservation> to_observations(const std::vector<SatelliteReport>& reports) {
+  std::vector<SatelliteObservation> observations;
+  for (const SatelliteReport& report : reports) {
+    SatelliteObservation observation;
+    observation.id = report.id;
+    observation.look = report.look;
+    observation.cn0_dbhz = report.cn0_dbhz;
+    observation.tracked = report.is_tracked;
+    observation.residual_m = report.residual_m;
+    observations.push_back(observation);
+  }
+  return observations;
+}
+
 Receiver::Receiver(const ReceiverParameters& parameters, std::uint64_t seed)
     : parameters_(parameters),
       seed_(seed),

@@ -4,7 +4,6 @@
 #include <vector>
 
 #include "receiver_rig.hpp"
-#include "urban_gnss_localization/experiments/city_drive.hpp"
 #include "urban_gnss_localization/gnss/nominal_cn0.hpp"
 #include "urban_gnss_localization/gnss/range_fix.hpp"
 #include "urban_gnss_localization/simulation/receiver.hpp"

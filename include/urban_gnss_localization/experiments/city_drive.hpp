@@ -44,9 +44,6 @@ struct DriveRecord {
   Trajectory odometry;  ///< base_link, odometry frame
 };
 
-/// What a receiver reports of its satellites, without the truth about them.
-std::vector<SatelliteObservation> to_observations(const std::vector<SatelliteReport>& reports);
-
 /// Drives the scenario to its end. Of a spinning lidar's scans one in `cloud_every` is passed on; where nobody wants
 /// clouds there is no lidar. `on_progress` is told the share done, 0 to 1. Throws what CitySimulator throws.
 DriveRecord drive_city(Scenario scenario, int cloud_every, const std::vector<DriveParticipant*>& participants,

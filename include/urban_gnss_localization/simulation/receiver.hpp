@@ -9,6 +9,7 @@
 #include "urban_gnss_localization/common/parameters.hpp"
 #include "urban_gnss_localization/common/random.hpp"
 #include "urban_gnss_localization/geometry/angles.hpp"
+#include "urban_gnss_localization/gnss/satellite.hpp"
 #include "urban_gnss_localization/simulation/position_solution.hpp"
 #include "urban_gnss_localization/simulation/pseudoranges.hpp"
 
@@ -71,6 +72,9 @@ struct SatelliteReport {
   double range_error_m{0.0};  ///< truth, of the pseudorange, without the receiver's clock; NaN where not tracked
   double excess_m{0.0};       ///< truth, of the tracked path over the line of sight; NaN where not tracked
 };
+
+/// What a receiver reports of its satellites, without the truth about them.
+std::vector<SatelliteObservation> to_observations(const std::vector<SatelliteReport>& reports);
 
 /// A position with what the receiver claims of it.
 struct ReceiverFix {
