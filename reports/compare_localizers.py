@@ -54,6 +54,8 @@ ABLATIONS = {
     "biased modes": ["expert.bias.direct_time=1.0e+15"],
 }
 
+LONGEST_LINE = 120  # characters, in docs/
+
 DIVERGED_M = 100.0
 DIVERGED_S = 30.0
 SMALLEST_ERROR_M = 0.1
@@ -233,9 +235,27 @@ def table(results, methods):
 
 
 def markdown(header, rows):
-    """The table as Markdown."""
-    lines = ["| " + " | ".join(header) + " |", "|" + "---|" * len(header)]
-    return "\n".join(lines + ["| " + " | ".join(["`" + row[0] + "`"] + row[1:]) + " |" for row in rows])
+    """The table as Markdown: several, each with the first column, where one had lines longer than LONGEST_LINE."""
+    tables, begin = [], 1
+    while begin < len(header):
+        end = begin + 1
+        while end < len(header) and is_narrow(part(header, rows, begin, end + 1)):
+            end += 1
+        tables.append("\n".join(part(header, rows, begin, end)))
+        begin = end
+    return "\n\n".join(tables)
+
+
+def part(header, rows, begin, end):
+    """The lines of a Markdown table of the first column and those from `begin` up to `end`."""
+    head = header[:1] + header[begin:end]
+    lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
+    return lines + ["| " + " | ".join(["`" + row[0] + "`"] + row[begin:end]) + " |" for row in rows]
+
+
+def is_narrow(lines):
+    """Whether no line is longer than the pages of docs/ allow."""
+    return max(len(line) for line in lines) <= LONGEST_LINE
 
 
 def replace_between(text, name, content, path):

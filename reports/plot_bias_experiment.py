@@ -103,8 +103,10 @@ def settling(row):
 
 def table_of(scenario):
     """The errors of one scenario as a table of Markdown."""
-    lines = ["| | mean error before / between / after, m | max between, m | NEES (3) before / between / after "
-             "| doubted between, % | bias insignificant after leaving, s |",
+    lines = ["Mean error and NEES: before / between / after the buildings. Settled: time from leaving the buildings until",
+             "the bias is insignificant, in the slowest drive.",
+             "",
+             "| | mean error, m | max between, m | NEES (3) | doubted between, % | settled, s |",
              "|---|---|---|---|---|---|"]
     rows = [("fixes", scenario["fixes"])] + [(name, scenario["filters"][name]) for name in FILTERS]
     for name, row in rows:

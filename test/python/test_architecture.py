@@ -56,14 +56,24 @@ def split(names):
     return {name.strip() for name in names.split(",")} - {"", "–"}
 
 
+def read_sets(text, *columns):
+    """{name in the first column: names in the second}; a row without a name continues the row above."""
+    sets = {}
+    name = None
+    for first, names, *_ in read_table(text, *columns):
+        name = first or name
+        sets.setdefault(name, set()).update(split(names))
+    return sets
+
+
 def read_arrows(text):
     """{room: rooms that it may include}."""
-    return {room: split(targets) for room, targets, *_ in read_table(text, "room", "may include")}
+    return read_sets(text, "room", "may include")
 
 
 def read_libraries(text):
     """{library: its rooms}."""
-    return {library: split(rooms) for library, rooms, *_ in read_table(text, "library", "rooms")}
+    return read_sets(text, "library", "rooms")
 
 
 def room_of(path):
@@ -265,8 +275,9 @@ class Check(unittest.TestCase):
         self.assertEqual(["a", "b", "c"], find_circle({"a": {"b"}, "b": {"c"}, "c": {"a"}, "d": set()}))
 
     def test_table(self):
-        text = "text\n\n| room | may include |\n|---|---|\n| `a` | – |\n| `b/c` | `a`, d |\n\n| room | may include |\n"
-        self.assertEqual({"a": set(), "b/c": {"a", "d"}}, read_arrows(text))
+        text = ("text\n\n| room | may include |\n|---|---|\n| `a` | – |\n| `b/c` | `a`, d |\n| | e |\n\n"
+                "| room | may include |\n")
+        self.assertEqual({"a": set(), "b/c": {"a", "d", "e"}}, read_arrows(text))
         with self.assertRaises(ValueError):
             read_arrows("no table")
 

@@ -70,6 +70,14 @@ class TextTest(unittest.TestCase):
                 compare.replace_between(broken, "comparison", "new", "f")
 
 
+    def test_wide_table_becomes_several(self):
+        header = ["name", "a" * 50, "b" * 50, "c" * 50]
+        tables = compare.markdown(header, [["x", "1", "2", "3"]]).split("\n\n")
+        self.assertEqual(tables, ["| name | {} | {} |\n|---|---|---|\n| `x` | 1 | 2 |".format(*header[1:3]),
+                                  "| name | {} |\n|---|---|\n| `x` | 3 |".format(header[3])])
+        self.assertEqual(compare.markdown(["n", "a", "b"], []), "| n | a | b |\n|---|---|---|")
+
+
 class ProgramTest(unittest.TestCase):
     def setUp(self):
         scratch = tempfile.TemporaryDirectory()

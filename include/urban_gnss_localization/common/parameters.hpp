@@ -24,7 +24,7 @@ struct Range {
   std::string describe() const;
 };
 
-/// Both ends of a range are in it, but for positive(), which leaves out 0, and open_between(), which leaves out `low`.
+/// Both ends belong to a range, except for positive(), which leaves out 0, and open_between(), which leaves out `low`.
 inline Range positive() { return {0.0, std::numeric_limits<double>::infinity(), true}; }
 inline Range non_negative() { return {0.0, std::numeric_limits<double>::infinity(), false}; }
 inline Range between(double low, double high) { return {low, high, false}; }

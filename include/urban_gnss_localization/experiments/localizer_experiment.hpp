@@ -30,7 +30,7 @@ struct LocalizerExperimentConditions {
   int cloud_every{5};                     ///< of a spinning lidar's scans, one in so many goes into the maps
 };
 
-/// A time without fixes, and when the first came that was worth something.
+/// A time without fixes, and when the first good fix came after it.
 struct FixOutage {
   Stamp begin{0};     ///< the last fix before
   Stamp good_fix{0};  ///< the first fix after it with an error of at most kGoodFix_m

@@ -55,7 +55,7 @@ struct PaperMethod {
 /// Every method that the experiment knows.
 const std::vector<PaperMethod>& paper_methods();
 
-/// One step of one run: what was true, what was measured, what was believed.
+/// One step of one run: truth, measurement and estimate.
 struct PaperStep {
   double time_s{0.0};
   int lap{0};

@@ -34,7 +34,7 @@ struct FixValidationParameters {
   void check(std::vector<std::string>& faults) const;
 };
 
-/// A fix after validation. Where is_rejected(outcome.decision), `fix` holds nothing but the stamp.
+/// A fix after validation. Where is_rejected(outcome.decision), only the stamp of `fix` is set.
 struct ValidatedFix {
   LocalFix fix;
   FixOutcome outcome;
@@ -45,8 +45,8 @@ struct ValidatedFix {
 /// a place, and are not both exactly 0, which is what receivers report before they know (else kRejectedOutOfRange).
 bool is_usable_position(const RawFix& raw);
 
-/// Decides whether a fix can be used at all, and brings it to the map frame with a covariance that can be worked with.
-/// Finite and positive definite for every possible input; never throws on account of one.
+/// Decides whether a fix can be used at all, and transforms it to the map frame with a usable covariance: finite and
+/// positive definite for every input. Never throws because of the input.
 ///
 /// The first check that fails decides: those of is_usable_position() in their order, then the stamp is newer than
 /// `last_stamp` (else kRejectedStale), then the distance from the datum (else kRejectedOutOfRange). An altitude that no

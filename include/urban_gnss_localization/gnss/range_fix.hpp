@@ -12,7 +12,7 @@
 
 namespace urban_gnss {
 
-/// What the ranges of a fix are worth, one by one.
+/// Parameters of the ranges of a fix.
 struct RangeFixParameters {
   bool use_ranges{true};
   double range_sigma{5.0};
@@ -58,10 +58,10 @@ struct RelativePlace {
   Eigen::Matrix2d covariance{Eigen::Matrix2d::Identity()};  ///< m^2
 };
 
-/// What the ranges of one fix say of the antenna's place, but for what was known before: the fix's own solution, taken
-/// apart and put together anew. A receiver solves for its position by least squares and reports the residual of each
-/// range, so the range is known but for the clock: at a place d from the fix, its residual is r_i - h_i d, with
-/// h_i = -(line of sight, ...) and a clock for each constellation.
+/// The likelihood of the antenna's place given the ranges of one fix: the position is solved anew from the ranges. A
+/// receiver solves for its position by least squares and reports the residual of each range, so the range is known
+/// except for the clock: at a place d from the fix, its residual is r_i - h_i d, with h_i = -(line of sight, ...) and a
+/// clock for each constellation.
 ///
 /// A range is either in line of sight, with an error of range_sigma, or NLOS, with an excess range by nlos_range(). Its
 /// C/N0 gives the prior odds (nlos_log_odds(), even at nlos_cn0_drop below `nominal_cn0_dbhz`). Then least squares over
@@ -69,7 +69,7 @@ struct RelativePlace {
 /// expectation maximization (Dempster, Laird and Rubin 1977), a fixed number of rounds. The judgement takes the
 /// residual's variance to be larger by that of the place: softer than the exact step. In the end each range counts as
 /// one Gaussian with the moments of both kinds, so that what is left open makes the covariance larger. `known` is not
-/// part of the result: that is the likelihood of the ranges, with at least 100 m where they say nothing.
+/// part of the result, which is the likelihood of the ranges alone. Its sigma is at least 100 m where they say nothing.
 ///
 /// Nothing where fewer than 2 satellites share a clock.
 std::optional<RelativePlace> range_fix(const std::vector<SatelliteObservation>& satellites, double nominal_cn0_dbhz,

@@ -7,7 +7,7 @@
 
 namespace urban_gnss {
 
-/// The bias of the fixes as it stands after one of them: what gps/bias carries from a bias filter to a localizer.
+/// The bias of the fixes after one of them: what gps/bias carries from a bias filter to a localizer.
 struct BiasEstimate {
   Stamp stamp{0};                                       ///< of the fix
   Eigen::Vector2d bias{Eigen::Vector2d::Zero()};        ///< m, fix minus antenna

@@ -53,7 +53,7 @@ struct LocalizerHealth {
   bool is_gate_inert{false};  ///< its gate passes everything, as the fixes' covariance is far too large
 };
 
-/// A pose filter of odometry and fixes in the map frame. It knows no clock and no message: the pipeline calls it in the
+/// A pose filter of odometry and fixes in the map frame. It has no clock and no messages: the pipeline calls it in the
 /// order of the stamps.
 class Localizer {
  public:
@@ -76,7 +76,7 @@ class Localizer {
 
   /// Whether it makes use of the receiver's velocity.
   virtual bool takes_velocity() const { return false; }
-  /// Takes one velocity of the receiver; the methods that know of none leave it out.
+  /// Takes one velocity of the receiver; methods that do not use velocities ignore it.
   virtual void correct_velocity(const VelocityMeasurement& /*velocity*/) {}
 
   /// Whether it makes use of the satellites of a fix.

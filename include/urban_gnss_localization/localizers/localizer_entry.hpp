@@ -51,7 +51,7 @@ struct LocalizerEntry {
   std::string summary;  ///< one sentence
   std::function<std::unique_ptr<LocalizerSettings>()> settings;  ///< the defaults
   std::vector<LocalizerVariant> variants;
-  /// The parameters that several localizers have alike stand once, in config/shared_parameters.yaml; empty: it shares
+  /// The parameters that several localizers share are in one file, config/shared_parameters.yaml; empty: it shares
   /// none.
   std::string shared_parameters{};
   bool has_particles{false};  ///< it is a ParticleLocalizer

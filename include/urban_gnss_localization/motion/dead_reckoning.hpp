@@ -23,7 +23,7 @@ struct DeadReckoningStep {
 /// Dead-reckons one step of the measured twist, corrected by `errors`, with the noise of the motion model, eq. (5)-(7)
 /// of Nishida et al., linearised, and with the walks of `parameters`. The Sigma_v of Kim et al. is the motion model's
 /// with odom_alpha1 for the speed and odom_alpha4 for the yaw rate alone; their Sigma_N are position_walk and
-/// heading_walk. At a standstill the pose stays, and nothing but parked_walk is added.
+/// heading_walk. At a standstill the pose stays, and only parked_walk is added.
 DeadReckoningStep dead_reckon(const Pose2& pose, const OdometryErrors& errors, const MotionStep& step,
                               const OdometryErrorParameters& parameters);
 

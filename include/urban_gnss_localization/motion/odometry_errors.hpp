@@ -5,8 +5,8 @@
 
 namespace urban_gnss {
 
-/// How wrong the odometry may be, for filters that estimate that beside the pose. With sigmas and walks of 0 they do
-/// not.
+/// How wrong the odometry may be, for filters that estimate its errors beside the pose. With sigmas and walks of 0 they
+/// do not estimate them.
 struct OdometryErrorParameters {
   double motion_noise_factor{0.003};
   double speed_scale_sigma{0.02};

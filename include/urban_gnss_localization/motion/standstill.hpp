@@ -8,8 +8,8 @@ namespace urban_gnss {
 inline constexpr double kStandstill_mps = 1e-3;
 /// Yaw rate that may be left at a standstill: the offset of a gyroscope, up to 0.6 degrees a second.
 inline constexpr double kStandstill_radps = 0.01;
-/// Mean speed over the time between two fixes below which the robot stood: the jitter of odometry from lidar or cameras
-/// adds up to some centimetres a second, and who creeps more slowly meets the same reflections.
+/// Below this mean speed between two fixes the robot stood. The jitter of odometry from lidar or cameras adds up to
+/// some centimetres a second, and a robot that creeps more slowly still meets the same reflections.
 inline constexpr double kStandstillMean_mps = 0.05;
 
 /// Whether the robot stands during a step of odometry, which then has no error, neither noise nor bias. A method whose

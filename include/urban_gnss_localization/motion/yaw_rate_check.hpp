@@ -4,8 +4,8 @@
 
 namespace urban_gnss {
 
-/// Compares the yaw rate of an IMU with that of the odometry, for what goes wrong when one is mounted: upside down, or
-/// in degrees. While the odometry turns, the IMU's rate is fitted as a factor times the odometry's.
+/// Compares the yaw rate of an IMU with that of the odometry, to find an IMU that is mounted upside down or reports
+/// degrees. While the odometry turns, the IMU's rate is fitted as a factor times the odometry's.
 class YawRateCheck {
  public:
   /// Odometry that turns slower than this (rad/s) tells nothing.

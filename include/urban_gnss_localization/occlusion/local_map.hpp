@@ -48,8 +48,8 @@ struct ScanReport {
 };
 
 /// Builds the map of the surroundings from scans (Maier & Kleiner 2010, section IV.A and eq. 5): cut, align at
-/// keyframes, insert. A correction that the alignment finds stays in force until the next one; where an alignment is
-/// not accepted the scan goes in as the guess and the correction so far have it, and the report says so.
+/// keyframes, insert. A correction that the alignment finds stays in force until the next one; if an alignment is not
+/// accepted, the scan is inserted with the guess and the last correction, and the report says so.
 class LocalMap {
  public:
   /// Throws ParameterError.

@@ -7,7 +7,7 @@
 
 namespace urban_gnss {
 
-/// The coarse cubes of space that a lidar's rays have passed: what tells free sky from sky never looked at.
+/// The coarse cubes of space that a lidar's rays have passed. They tell free sky from sky that the lidar never saw.
 class ObservedSpace {
  public:
   /// `edge_m` > 0 is the edge of a cube.

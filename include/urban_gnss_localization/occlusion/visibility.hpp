@@ -60,16 +60,16 @@ struct VisibilitySampling {
   std::vector<double> upwards;  ///< likewise, of the elevation
 };
 
-/// Rays to a satellite, spread over what is not known of its direction: the heading's error is an error of the azimuth,
-/// the antenna's place and the receiver's rounding (a step of `angle_resolution_rad`) are the rest. `look` must be
+/// Rays to a satellite, spread over the uncertainty of its direction: the heading's error is an error of the azimuth;
+/// the rest is the antenna's place and the receiver's rounding (a step of `angle_resolution_rad`). `look` must be
 /// finite. A displacement of the antenna turns nothing at infinity, but near walls it decides; every ray starts from a
 /// place displaced across it by the quantile that its azimuth has.
 SatelliteVisibility assess_visibility(const RayTracer& tracer, const ObservedSpace& observed,
                                       const AntennaPose& antenna, const LookAngles& look, double angle_resolution_rad,
                                       const VisibilitySampling& sampling);
 
-/// How high what blocks reaches in each of `azimuths` equal steps of azimuth (clockwise from north): the elevation,
-/// rad, up to which rays are blocked, searched in steps of `step_rad`, 0 where none is. For the sky plot.
+/// The skyline in `azimuths` equal steps of azimuth (clockwise from north): the elevation, rad, up to which rays are
+/// blocked, searched in steps of `step_rad`; 0 where none is. For the sky plot.
 std::vector<double> skyline(const RayTracer& tracer, const AntennaPose& antenna, int azimuths, double step_rad);
 
 }  // namespace urban_gnss

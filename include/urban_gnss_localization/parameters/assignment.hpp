@@ -7,9 +7,9 @@
 
 namespace urban_gnss {
 
-/// Puts "a.b.c=value" over a map, whose maps on the way are made where they are missing. A scalar is set as text, which
-/// has no place in a file that a fault could name. Throws std::runtime_error with the text where it is no assignment,
-/// where the value is no YAML, and where a name on the way is no map.
+/// Puts "a.b.c=value" over a map, whose maps on the way are made where they are missing. A scalar is set as text
+/// without a place in a file, so that a fault names none. Throws std::runtime_error with the text where it is no
+/// assignment, where the value is no YAML, and where a name on the way is no map.
 void assign(YAML::Node map, const std::string& text);
 
 /// Puts a map over another, name by name; what is no map in both is replaced.

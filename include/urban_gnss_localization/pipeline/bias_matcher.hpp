@@ -26,7 +26,7 @@ class BiasMatcher {
 
   void add(const BiasEstimate& bias);
 
-  /// Whether the bias of a fix is still worth waiting for, `waited_s` of odometry after it.
+  /// Whether a fix should go on waiting for its bias, `waited_s` of odometry after it.
   bool awaits(Stamp fix, double waited_s) const;
 
   /// The bias of a fix, as its turn has come; nothing where it did not come in time.

@@ -14,8 +14,8 @@ class BiasResponder {
  public:
   explicit BiasResponder(const GpsBiasParameters& parameters) : tracker_(parameters) {}
 
-  /// Answers all that the pipeline asks, and returns the answers. What was tracked is forgotten where the pipeline has
-  /// begun another epoch.
+  /// Answers all that the pipeline asks, and returns the answers. Forgets what was tracked when the pipeline has begun
+  /// another epoch.
   std::vector<BiasEstimate> answer(LocalizationPipeline& pipeline);
 
  private:

@@ -29,8 +29,8 @@ enum class InputStream { kOdometry, kFixes, kImu, kVelocities, kEstimates };
 /// As an event names it.
 const char* to_string(InputStream stream);
 
-/// The clocks of a pipeline's inputs, one a stream. Stamps ascend in each; where one clock was set back, all are taken
-/// to have been.
+/// The clocks of a pipeline's inputs, one a stream. Stamps ascend in each. If one clock was set back, all count as set
+/// back.
 class InputClocks {
  public:
   /// Requires parameters without faults.

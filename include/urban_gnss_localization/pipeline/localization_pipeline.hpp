@@ -110,7 +110,7 @@ class LocalizationPipeline {
 
   void process_fixes();
   bool process_next_fix();
-  /// Whether satellites or bias of a fix are still to come, and worth waiting for.
+  /// Whether the fix should wait for its satellites or its bias.
   bool awaits_more(Stamp fix) const;
   void start_with(const ValidatedFix& fix);
   bool restart_with(const ValidatedFix& fix);

@@ -26,9 +26,9 @@ struct MapConsistencyParameters {
   }
 };
 
-/// Whether what the map says agrees with what is received. Behind a building a signal is weak or not there at all. With
-/// a heading that is far off, or a map that is wrong, as many of the satellites that are said to be blocked are
-/// received strongly as of any others; a street that looks the same both ways hides it.
+/// Whether what the map says agrees with what is received. Behind a building a signal is weak or not there at all. If
+/// the heading is far off or the map is wrong, the satellites that the map blocks are received strongly as often as the
+/// others. In a street that looks the same both ways this test does not find a heading that is off by 180 degrees.
 class MapConsistency {
  public:
   /// Requires parameters without faults.

@@ -116,8 +116,8 @@ class OcclusionPipeline {
   OcclusionPipeline& operator=(const OcclusionPipeline&) = delete;
 
   /// A cloud in the sensor's frame (m), with the robot's pose in the odometry frame at the cloud's own stamp. One that
-  /// is older than the last by more than map_timeout is taken: the last one's stamp was wrong. One of nothing but
-  /// ground says that nothing stands about.
+  /// is older than the last by more than map_timeout is taken: the last one's stamp was wrong. A cloud that holds only
+  /// ground says that there are no obstacles.
   CloudOutcome add_cloud(Stamp stamp, const PointCloud& cloud, const Eigen::Isometry3d& sensor_in_base,
                          const Eigen::Isometry3d& base_in_odom);
   /// A map that was there before, in the world's axes; turned into the odometry frame by `odom_in_world`.

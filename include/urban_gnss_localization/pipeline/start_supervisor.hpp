@@ -51,8 +51,9 @@ struct StartFix {
   Eigen::Vector2d antenna;         ///< m, in the base frame
 };
 
-/// Decides when a localizer starts, and from where: from a given pose, or from fixes and motion; after a while without
-/// a heading, which is found as soon as the robot moves. Decides when it has lost its place and starts anew.
+/// Decides when a localizer starts, and from where: from a given pose, or from fixes and motion. After a time-out it
+/// starts without a heading, which is then found as soon as the robot moves. Decides when it has lost its place and
+/// starts anew.
 class StartSupervisor {
  public:
   /// Requires parameters without faults.
@@ -82,7 +83,7 @@ class StartSupervisor {
 
   /// The localizer was started from `start`.
   void note(const Start& start);
-  /// The place is unknown, and what fixes and motion said of it until now as well.
+  /// The place is unknown. Forgets what fixes and motion said of it until now.
   void lose_place();
 
   void reset() { *this = StartSupervisor(parameters_); }

@@ -26,10 +26,10 @@ bool is_usable_yaw_rate(double yaw_rate_radps);
 
 /// The IMU's yaw rate in place of the odometry's, as long as it comes.
 ///
-/// A localizer that estimates the yaw rate's bias has one bias for both sources. That of the IMU holds on while the
-/// odometry steps in, which is wrong by the difference of their biases: some hundredths of a radian in 10 s, little
-/// beside the uncertainty that grows in that time, but not to be kept up for minutes. So a change of the source is an
-/// event, and so is an IMU that contradicts the odometry.
+/// A localizer that estimates the yaw rate's bias has one bias for both sources. While the odometry replaces the IMU,
+/// the IMU's bias is still applied. The yaw rate is then wrong by the difference of the two biases: some hundredths of
+/// a radian in 10 s. This is little beside the uncertainty that grows in that time, but too much over minutes. So a
+/// change of the source is an event, and so is an IMU that contradicts the odometry.
 class YawRateSource {
  public:
   /// `silence_s`: without a yaw rate for longer than this, the IMU is silent. Requires parameters without faults.
@@ -40,7 +40,7 @@ class YawRateSource {
   void add(Stamp stamp, double yaw_rate_radps);
 
   /// The twist of a step of odometry that began at `since`: its yaw rate is the mean of the IMU's within the step, or
-  /// the last one from up to 0.2 s before it, and where there is none the odometry's own. What changes is appended to
+  /// the last one from up to 0.2 s before it, or the odometry's own if there is none. What changes is appended to
   /// `events`.
   Twist2 twist_of(const OdometrySample& step, Stamp since, std::vector<PipelineEvent>& events);
 

@@ -10,8 +10,8 @@
 
 namespace urban_gnss {
 
-/// Says on the console what happened. A warning that is repeated to the letter is said once in five seconds; another
-/// one is never held back by it.
+/// Writes events to the console. The same warning is written at most once in five seconds; other warnings are never
+/// held back.
 class EventLog {
  public:
   void log(const std::vector<PipelineEvent>& events);

@@ -7,8 +7,8 @@
 
 namespace urban_gnss {
 
-/// Watches one subscribed topic for what goes wrong in a graph: two publishers at once, a frame that changes. Says
-/// each once a change.
+/// Watches one subscribed topic for two faults of a graph: two publishers at once, and a frame that changes. Reports
+/// each change once.
 class InputWatch {
  public:
   void set_subscriber(const ros::Subscriber& subscriber) { subscriber_ = subscriber; }

@@ -48,7 +48,7 @@ struct LocalizerNodeParameters {
 };
 
 /// The shell of every localizer: topics, services, tf, status and diagnostics around a LocalizationPipeline. A
-/// localizer node makes its filter, hands it over and, where it has more to show, publishes that in `on_output`.
+/// localizer node makes its filter and hands it over. Further outputs are published in `on_output`.
 ///
 /// Subscribes odom, gps/fix, initialpose, gps/datum; gps/bias, gps/velocity and gps/satellites where the filter wants
 /// them; imu/data where use_imu_yaw_rate is set. Publishes odometry/filtered, tf map -> odom, ~status, and gps/datum

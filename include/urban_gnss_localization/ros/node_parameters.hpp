@@ -13,7 +13,7 @@ namespace urban_gnss {
 /// way.
 YAML::Node private_parameters(const ros::NodeHandle& private_node);
 
-/// For a node that learns from one struct which others to read: finish_reading() must come last.
+/// For a node that must read one struct to know which others to read. finish_reading() must come last.
 ParameterReader private_parameter_reader(const ros::NodeHandle& private_node);
 /// Throws ParameterError with every fault.
 void finish_reading(const ros::NodeHandle& private_node, const ParameterReader& reader);
@@ -26,8 +26,8 @@ void read_private_parameters(const ros::NodeHandle& private_node, P&... paramete
   finish_reading(private_node, reader);
 }
 
-/// Reads structs out of another node's parameters, most of which are not its own: what they do not know is left out,
-/// and bad values are that node's to refuse.
+/// Reads structs out of another node's parameters. Names that the structs do not have are left out. Bad values are not
+/// reported: the other node refuses them.
 template <class... P>
 void read_known_parameters(const ros::NodeHandle& other_node, P&... parameters) {
   ParameterReader reader(private_parameters(other_node), "", "", Layout::kTiered);

@@ -64,8 +64,8 @@ struct SatelliteReport {
   double cn0_dbhz{0.0};  ///< rounded to 1 dB; NaN where not tracked
   bool is_tracked{false};
   bool is_used{false};
-  /// Measured minus expected range at the fix's position (as sentence GRS of NMEA 0183 has it, but for the sign), with
-  /// the clocks that fit best there; NaN where not used.
+  /// Measured minus expected range at the fix's position (as in sentence GRS of NMEA 0183, with the opposite sign),
+  /// with the clocks that fit best there; NaN where not used.
   double residual_m{0.0};
 
   PathClass path_class{PathClass::kBlocked};  ///< truth

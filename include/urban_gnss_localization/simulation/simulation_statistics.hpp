@@ -11,7 +11,7 @@
 
 namespace urban_gnss {
 
-/// What there is to say of the satellites of one path class.
+/// Statistics of the satellites of one path class.
 struct PathClassSummary {
   PathClass path_class{PathClass::kBlocked};
   std::size_t count{0};   ///< of satellites and epochs
@@ -20,7 +20,7 @@ struct PathClassSummary {
   Summary cn0_dbhz;
 };
 
-/// How a simulated receiver did.
+/// Statistics of a simulated receiver.
 struct ReceiverSummary {
   std::size_t epochs{0};
   double availability{0.0};        ///< share of the epochs with a finite fix

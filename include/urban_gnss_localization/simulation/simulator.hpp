@@ -57,7 +57,7 @@ struct SignalsEvent {
   std::vector<SignalTruth> signals;
 };
 
-/// Something that happened in the simulated world and that the outside gets to see.
+/// Something that happened in the simulated world and is published.
 struct SimulationEvent {
   Stamp stamp{0};      ///< of the measurement
   Stamp published{0};  ///< when it leaves the sensor, not before `stamp`

@@ -40,8 +40,8 @@ struct BiasDetection {
 /// Detection of a biased fix (Kim et al. section 4.2). The paper's threshold of 7.81 is the 95 % quantile for three
 /// degrees of freedom; a horizontal fix has two.
 ///
-/// Beside the NIS of one fix it watches the run of innovations: two-sided CUSUMs (Page 1954) of their whitened
-/// components find a bias that grows slowly, each step of it below the gate.
+/// Beside the NIS of one fix it watches the sequence of innovations: two-sided CUSUMs (Page 1954) of their whitened
+/// components find a bias that grows slowly, with each step below the gate.
 class BiasDetector {
  public:
   /// Requires parameters without faults.

@@ -83,7 +83,7 @@ class ComplementaryEkf : public Localizer {
     bool is_frozen;
   };
 
-  /// Whether the noise of the fixes is taken as they scatter, and slow drifts of them are looked for.
+  /// Whether the noise of the fixes is estimated from their scatter, and slow drifts are searched for.
   bool is_adaptive() const;
   /// Factor on the declared covariance, as the fixes scatter and as the robot stands.
   double noise_inflation() const;

@@ -40,7 +40,8 @@ struct ComplementaryEkfParameters {
   bool estimate_odometry_errors{true};
   BiasDetectorParameters detector;
   FixNoiseParameters fix_noise;
-  /// A yaw rate of the wheels below 1e-4 rad/s is none: one of 0.01 rad/s, which a gyroscope may have standing, is not.
+  /// Below 1e-4 rad/s the wheels do not turn the robot. The limit of 0.01 rad/s, which a gyroscope may show at a
+  /// standstill, would be too large here.
   OdometryErrorParameters odometry{1.0, 0.02, 2e-4, 0.005, 3e-5, 0.05, 0.003, 0.0, 1e-4};
   MotionParameters motion = kim_motion();
 

@@ -24,12 +24,12 @@ struct FixNoiseParameters {
   }
 };
 
-/// How much a fix with a coloured error is worth, from a variogram of the fixes against short-horizon odometry: half
-/// the mean square by which two fixes differ beyond what the robot moved, relative to their declared covariance, for
-/// neighbours (near) and for fixes `fix_noise_horizon` apart (far). White errors of the declared size give 1 and 1. An
-/// error of correlation rho from fix to fix has near = (1 - rho) far; averaging such fixes is worth as much as
-/// averaging white ones whose variance is (1 + rho) / (1 - rho) = (2 far - near) / near times larger. It depends on no
-/// estimate of a filter's, so that it cannot talk itself into anything.
+/// The effective noise of a fix with a coloured error, from a variogram of the fixes against short-horizon odometry:
+/// half the mean square by which two fixes differ beyond what the robot moved, relative to their declared covariance,
+/// for neighbours (near) and for fixes `fix_noise_horizon` apart (far). White errors of the declared size give 1 and 1.
+/// An error of correlation rho from fix to fix has near = (1 - rho) far; averaging such fixes is as good as averaging
+/// white ones whose variance is (1 + rho) / (1 - rho) = (2 far - near) / near times larger. It does not depend on the
+/// estimate of a filter, so that it cannot confirm its own errors.
 class FixNoiseMonitor {
  public:
   /// Requires parameters without faults.

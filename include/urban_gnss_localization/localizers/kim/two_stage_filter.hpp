@@ -11,10 +11,10 @@ namespace urban_gnss {
 /// it gives what a Kalman filter of the augmented state (x, b) gives (to rounding; a test compares them).
 ///
 /// Against the paper's text: 3.2 A.2 and A.3 use the Jacobians where the nonlinear f and h are meant, so that the
-/// predicted state and the innovation come from the one who calls; P is updated in Joseph form; b may walk randomly.
+/// predicted state and the innovation come from the caller; P is updated in Joseph form; b may walk randomly.
 ///
 /// While the bias covariance is zero this is the bias-free filter alone: open_bias() starts the second stage,
-/// close_bias() ends it. Sizes may be Eigen::Dynamic; units and frames are those of the one who calls.
+/// close_bias() ends it. Sizes may be Eigen::Dynamic; units and frames are the caller's.
 template <int StateSize, int BiasSize, int MeasurementSize>
 class TwoStageFilter {
  public:
@@ -53,8 +53,8 @@ class TwoStageFilter {
 
   /// The random walk of the bias, M <- M + Q_b (the paper's bias is constant, its M goes to 0). x and P are rewritten
   /// so that the compensated estimate, its covariance and its covariance with the bias stay what they were (Hsieh and
-  /// Chen, "Optimal solution of the two-stage Kalman estimator", 1999): with Friedland's V kept as it is, they would
-  /// not. Requires M + Q_b positive definite.
+  /// Chen, "Optimal solution of the two-stage Kalman estimator", 1999): with Friedland's V alone they would change.
+  /// Requires M + Q_b positive definite.
   void grow_bias(const BiasCovariance& q_b) {
     const BiasCovariance grown = m_ + q_b;
     const Blending kept = grown.ldlt().solve(m_ * v_.transpose()).transpose();  // V M (M + Q_b)^-1

@@ -60,9 +60,9 @@ struct UkfParameters {
 ///
 /// Motion: the noise of Nishida et al. (5)-(7) enters as three more dimensions of the transform (move_noisily()).
 /// Fix: h is the antenna's position, lever arm included. The innovation's NIS is of the fix's own covariance; for the
-/// update, that is multiplied by (1 + a) / (1 - a), a = exp(-interval / fix_correlation_time), by which errors of a
-/// first-order Markov process tell less than independent ones, and divided by the weight of the Student-t distribution,
-/// min(1, (dof + 2) / (dof + NIS)).
+/// update, that is multiplied by (1 + a) / (1 - a), a = exp(-interval / fix_correlation_time), since errors of a
+/// first-order Markov process carry less information than independent ones, and divided by the weight of the Student-t
+/// distribution, min(1, (dof + 2) / (dof + NIS)).
 ///
 /// Yaws are averaged as differences from the central point that are never wrapped, which is the mean on the circle and
 /// has no ambiguity. Its standard deviation is kept at or below that of an unknown yaw, pi / sqrt(3).

@@ -71,7 +71,7 @@ struct GpsBiasParameters {
   }
 };
 
-/// Tracks the bias from fix to fix: the Kalman filter above with its start, its gate and the way out of a lock-out.
+/// Tracks the bias from fix to fix: the Kalman filter above with its start, its gate and its recovery from a lock-out.
 class BiasTracker {
  public:
   explicit BiasTracker(const GpsBiasParameters& parameters);

@@ -7,7 +7,8 @@
 
 namespace urban_gnss {
 
-/// Eq. (39): the number of equally weighted particles that say as much. Requires normalised weights.
+/// Eq. (39), the effective sample size: the number of equally weighted particles with the same information. Requires
+/// normalised weights.
 double effective_sample_size(const ParticleSet& particles);
 
 /// Eq. (35) with the mean angle taken on the circle. Requires normalised weights.

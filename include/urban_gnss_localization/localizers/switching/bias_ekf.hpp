@@ -111,13 +111,14 @@ struct FixNoise {
   bool of_ranges{false};  ///< the covariance is that of the fix's ranges, which use_fix_covariance does not concern
 };
 
-/// Takes a fix of the mode `mode`. Direct reception has the heavy tails of Student's t: a fix that is far off is one of
-/// larger noise. A share of outlier_share of the fixes says nothing: used or not used are matched again.
+/// Takes a fix of the mode `mode`. Direct reception has the heavy tails of Student's t: a fix that is far off counts as
+/// one with larger noise. A share of outlier_share of the fixes says nothing: the states with and without such a fix
+/// are merged by their moments.
 BiasEkfUpdate take_fix(BiasGaussian& state, BiasMode mode, const FixMeasurement& fix, const FixNoise& noise,
                        const SwitchingModelParameters& parameters);
 
 /// Takes a velocity of the receiver, whose noise is Student's t with `noise` for its covariance ((m/s)^2): it corrects
-/// yaw and speed scale. The likelihood is but for a constant.
+/// yaw and speed scale. The likelihood lacks a constant factor.
 BiasEkfUpdate take_velocity(BiasGaussian& state, const VelocityMeasurement& measured, const Eigen::Matrix2d& noise,
                             double student_dof);
 

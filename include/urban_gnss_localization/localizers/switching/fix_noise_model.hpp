@@ -46,13 +46,13 @@ struct DeadReckonedFix {
   double time_s{0.0};
 };
 
-/// What a fix is worth: the covariance that its receiver declares follows its errors up and down, but is too small
-/// or too large by a factor, which is learnt (LearntScale), and errors are correlated in time.
+/// The effective noise of a fix. The covariance that its receiver declares rises and falls with its errors, but is too
+/// small or too large by a factor, which is learnt (LearntScale). Errors are correlated in time.
 ///
-/// A receiver that smooths takes a filter along: the innovations stay small, and the factor learnt from them falls
+/// A receiver that smooths pulls a filter with it: the innovations stay small, and the factor learnt from them falls
 /// without end. Two fixes that are farther apart than it smooths, and the odometry between them, still tell its errors.
 ///
-/// That errors are correlated is markov_inflation().
+/// markov_inflation() accounts for the correlation of errors.
 class FixNoiseModel {
  public:
   /// Requires parameters without faults. `lag_s`: how far apart fixes are compared; 0: they are not.
@@ -69,7 +69,7 @@ class FixNoiseModel {
   /// drawn towards the geometric mean of those declared lately, by the power 1 - fix_covariance_weight, at most by a
   /// factor of 4.
   Eigen::Matrix2d effective_covariance(const Eigen::Matrix2d& declared);
-  /// Factor on the covariance of a fix at `time_s` by which correlation lowers its worth, at least 1.
+  /// Factor on the covariance of a fix at `time_s`, since correlated fixes carry less information; at least 1.
   double correlation_inflation(double time_s) const;
 
   /// The fix at `time_s` was used, with a share `exceeding` of its NIS beyond the median: LearntScale::learn().

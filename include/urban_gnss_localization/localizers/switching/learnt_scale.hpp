@@ -7,8 +7,8 @@ namespace urban_gnss {
 
 /// Factor k on a declared covariance of two dimensions, such that half of the measurements have a normalised innovation
 /// below the median of the chi-squared distribution (2 ln 2): each raises or lowers ln k by a rate (stochastic
-/// approximation of a quantile, Robbins and Monro 1951). Outliers, however far, weigh no more than others, and the half
-/// that are the worst of all may be anything.
+/// approximation of a quantile, Robbins and Monro 1951). Outliers, however far, have no more influence than others, and
+/// the worst half of the measurements may have any size.
 class LearntScale {
  public:
   /// Median of the chi-squared distribution of 2 degrees of freedom.

@@ -16,8 +16,8 @@ struct BiasHypothesis {
   double weight{0.0};
 };
 
-/// How different two states are: Bhattacharyya distance of their marginals, summed. States that are certain in both
-/// count for nothing.
+/// How different two states are: the sum of the Bhattacharyya distances of their marginals. Components that are certain
+/// in both are left out.
 double marginal_distance(const BiasGaussian& a, const BiasGaussian& b);
 
 /// The c with sum of min(1, w / c) = `most`, for weights in descending order that sum to 1; 0 where there are no more

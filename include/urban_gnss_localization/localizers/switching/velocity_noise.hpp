@@ -5,8 +5,8 @@
 
 namespace urban_gnss {
 
-/// What is believed of a receiver's velocity. Its errors are independent in time (those of a position are not), small
-/// beside most signals, and large where a reflected one is among them: Student's t, with a scale that is learnt.
+/// What is believed of a receiver's velocity. Its errors are independent in time (those of a position are not). They
+/// are mostly small, and large if a reflected signal is used: Student's t, with a scale that is learnt.
 struct VelocityNoiseParameters {
   double velocity_scale_rate{0.03};
   double first_velocity_scale{4.0};
