@@ -2,6 +2,7 @@
 
 #include "urban_gnss_localization/localizers/registry.hpp"
 #include "urban_gnss_localization/ros/node_parameters.hpp"
+#include "urban_gnss_localization/ros/run_localizer_node.hpp"
 
 namespace urban_gnss {
 

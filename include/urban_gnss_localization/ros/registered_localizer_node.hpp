@@ -45,7 +45,4 @@ struct LocalizerNodeSettings {
   }
 };
 
-/// The main function of a localizer's node.
-int run_localizer_node(int argc, char** argv, const std::string& name);
-
 }  // namespace urban_gnss
