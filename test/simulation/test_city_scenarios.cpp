@@ -152,6 +152,38 @@ TEST(CityScenarios, FixTruthIsTheFixMinusTheAntenna) {
   EXPECT_GT(count, 360u);
 }
 
+TEST(CityScenarios, ALateFixIsWhereTheAntennaWas) {
+  const double delay_s = 1.5;
+  const Scenario late = scenario("open_sky", {"duration=60", "receiver.fix_delay=1.5", "imu.rate=0"});
+  const Events events = run(late);
+  expect_ascending(events);
+  EXPECT_TRUE(of<ImuMessage>(events, late).empty());
+  std::map<Stamp, Vector3d> antennas;
+  for (const auto& truth : of<TruthEvent>(events, late)) {
+    const Pose2& pose = truth.content->pose;
+    const Vector3d arm = late.vehicle.antenna();
+    antennas[late.start_time + from_seconds(truth.time_s)] = {
+        pose.x + std::cos(pose.yaw) * arm.x() - std::sin(pose.yaw) * arm.y(),
+        pose.y + std::sin(pose.yaw) * arm.x() + std::cos(pose.yaw) * arm.y(), arm.z()};
+  }
+  const auto fixes = own_fixes(events);
+  double then_m = 0.0;
+  double now_m = 0.0;
+  double count = 0.0;
+  for (const auto& truth : of<FixTruthEvent>(events, late)) {
+    const Stamp stamp = late.start_time + from_seconds(truth.time_s);
+    const Vector3d place = fixes.at(stamp).fix.position;
+    EXPECT_LT((place - antennas.at(stamp) - truth.content->error).norm(), 1e-9);
+    if (truth.time_s < 15.0) continue;  // it drives
+    then_m += (place - antennas.at(stamp - from_seconds(delay_s))).head<2>().norm();
+    now_m += truth.content->error.head<2>().norm();
+    count += 1.0;
+  }
+  EXPECT_GT(count, 200.0);
+  EXPECT_LT(then_m / count, 4.0);
+  EXPECT_GT(now_m / count, 7.0) << "some 10 m/s for 1.5 s";
+}
+
 TEST(CityScenarios, SatellitesAreReportedInWholeDegrees) {
   const Scenario city = scenario("downtown_grid", {"duration=20", "lidar.type=none"});
   const Events events = run(city);
