@@ -83,7 +83,7 @@ class Experiment : public DriveParticipant {
     fix.stamp = epoch.stamp;
     fix.position = frame_.to_geodetic(epoch.fix->position);
     fix.covariance = epoch.fix->covariance;
-    fix.covariance_type = CovarianceType::kApproximated;
+    fix.covariance_type = epoch.fix->covariance_type;
 
     const bool is_between = contains(hull_, epoch.fix->position.head<2>() - epoch.error_m);
     was_between_ = was_between_ || is_between;

@@ -53,9 +53,10 @@ class Participant : public DriveParticipant {
     fix.stamp = epoch.stamp;
     fix.position = frame_.to_geodetic(epoch.fix->position);
     fix.covariance = epoch.fix->covariance;
-    fix.covariance_type = CovarianceType::kApproximated;
+    fix.covariance_type = epoch.fix->covariance_type;
     if (occlusion_) {
-      const Eigen::Matrix2d claimed = fix.covariance.topLeftCorner<2, 2>();
+      std::optional<Eigen::Matrix2d> claimed;
+      if (fix.covariance_type != CovarianceType::kUnknown) claimed = fix.covariance.topLeftCorner<2, 2>();
       fix.covariance.topLeftCorner<2, 2>() =
           occlusion_->assess(epoch.stamp, claimed, to_isometry(base_in_odom)).covariance.weighted;
       fix.covariance_type = CovarianceType::kKnown;

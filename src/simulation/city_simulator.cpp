@@ -18,6 +18,10 @@ double step_interval_s(const Scenario& scenario) {
   return 1.0 / std::max({scenario.odometry.rate, scenario.imu.rate, scenario.receiver.rate});
 }
 
+std::size_t steps_of(double duration_s, double interval_s) {
+  return static_cast<std::size_t>(std::lround(duration_s / interval_s));
+}
+
 SignalTruth signal_truth(const SatelliteReport& report, const ReceivedSatellite& satellite,
                          const Eigen::Vector3d& antenna) {
   SignalTruth truth;
@@ -59,6 +63,7 @@ CitySimulator::CitySimulator(Scenario scenario)
       cars_(scenario_.cars.begin(), scenario_.cars.end()),
       epoch_clock_(scenario_.receiver.rate),
       interval_s_(step_interval_s(scenario_)),
+      antenna_history_{antenna_state()},
       now_(scenario_.start_time) {}
 
 double CitySimulator::progress() const {
@@ -77,6 +82,8 @@ void CitySimulator::step(const std::optional<Twist2>& command, std::vector<Simul
   vehicle_.step(command ? *command : autopilot_.command(vehicle_.pose(), elapsed_s()), interval_s_);
   // Counted, not summed: a sum of rounded intervals drifts.
   now_ = scenario_.start_time + from_seconds(static_cast<double>(++steps_) * interval_s_);
+  antenna_history_.push_back(antenna_state());
+  if (antenna_history_.size() > 1 + steps_of(scenario_.receiver.fix_delay, interval_s_)) antenna_history_.pop_front();
 
   if (const auto odometry = odometry_.advance(vehicle_.twist(), interval_s_)) {
     add(TruthEvent{vehicle_.pose(), vehicle_.twist()});
@@ -99,8 +106,8 @@ void CitySimulator::step(const std::optional<Twist2>& command, std::vector<Simul
 }
 
 void CitySimulator::receive(double interval_s) {
-  const Eigen::Vector3d antenna = vehicle_.antenna_position();
-  sky_.above_horizon(now_, visible_);
+  const auto [antenna, velocity] = antenna_history_.front();
+  sky_.above_horizon(now_ - from_seconds(scenario_.receiver.fix_delay), visible_);
   received_.resize(visible_.size());
   for (std::size_t i = 0; i < visible_.size(); ++i) {
     received_[i].id = visible_[i].id;
@@ -108,7 +115,7 @@ void CitySimulator::receive(double interval_s) {
     received_[i].line_of_sight = line_of_sight(visible_[i].look);
     tracer_.trace(antenna, received_[i].line_of_sight, received_[i].paths);
   }
-  ReceiverEpoch epoch = receiver_.epoch(interval_s, antenna, vehicle_.antenna_velocity(), received_);
+  ReceiverEpoch epoch = receiver_.epoch(interval_s, antenna, velocity, received_);
   faults_.apply(elapsed_s(), epoch.fix, published_);
 
   // A serial line keeps the order also where the latency varies by more than the time between two epochs.
@@ -119,11 +126,14 @@ void CitySimulator::receive(double interval_s) {
     signals.signals.push_back(signal_truth(epoch.satellites[i], received_[i], antenna));
   }
   // Before the fix, so that who weighs it has them.
-  add(published, {now_, published, SatellitesEvent{std::move(epoch.satellites), scenario_.receiver.angle_resolution}});
+  if (scenario_.receiver.publishes_satellites) {
+    add(published,
+        {now_, published, SatellitesEvent{std::move(epoch.satellites), scenario_.receiver.angle_resolution}});
+  }
   for (const PublishedFix& fix : published_) {
     add(published, {now_, published, FixEvent{fix, epoch.used_count}});
     if (fix.publisher == 0 && fix.has_fix && fix.fix.position.allFinite()) {
-      add(published, {now_, published, FixTruthEvent{fix.fix.position - antenna, std::nullopt}});
+      add(published, {now_, published, FixTruthEvent{fix.fix.position - vehicle_.antenna_position(), std::nullopt}});
     }
   }
   add(published, {now_, published, std::move(signals)});

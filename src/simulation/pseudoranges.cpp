@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "urban_gnss_localization/geometry/angles.hpp"
+#include "urban_gnss_localization/simulation/gauss_markov.hpp"
 #include "urban_gnss_localization/simulation/knife_edge.hpp"
 
 namespace urban_gnss {
@@ -14,12 +15,6 @@ struct Arrival {
   double loss_db;
   int reflections;  ///< 0 for the line of sight and the way over an edge
 };
-
-/// A step of a stationary first-order Gauss-Markov process of variance 1.
-void step_gauss_markov(double& value, double interval_s, double time_s, RandomEngine& engine) {
-  const double kept = std::exp(-interval_s / time_s);
-  value = kept * value + std::sqrt(1.0 - kept * kept) * draw_normal(engine);
-}
 
 std::optional<Arrival> strongest(const SignalPaths& paths) {
   std::optional<Arrival> best;

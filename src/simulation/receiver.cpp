@@ -94,13 +94,15 @@ ReceiverEpoch Receiver::epoch(double interval_s, const Eigen::Vector3d& antenna,
   const double nlos_share = static_cast<double>(nlos_count) / solution->used_count;
 
   ReceiverFix fix;
-  fix.velocity_sigma_mps = solution->hdop * parameters_.velocity_sigma;
-  fix.velocity = velocity + (fix.velocity_sigma_mps + nlos_share * parameters_.velocity_nlos_sigma) * velocity_noise;
+  const double velocity_sigma_mps = solution->hdop * parameters_.velocity_sigma;
+  fix.velocity = velocity + (velocity_sigma_mps + nlos_share * parameters_.velocity_nlos_sigma) * velocity_noise;
+  if (parameters_.publishes_velocity) fix.velocity_sigma_mps = velocity_sigma_mps;
   fix.position = smoothed(interval_s, antenna + solution->position);
   refer_residuals(measurements, fix.position - antenna - solution->position, result.satellites);
   const double horizontal_m = parameters_.uere * solution->hdop;
   const double vertical_m = parameters_.uere * solution->vdop;
   fix.covariance = Eigen::Array3d(horizontal_m, horizontal_m, vertical_m).square().matrix().asDiagonal();
+  if (!parameters_.declares_covariance) fix.covariance_type = CovarianceType::kUnknown;
   last_velocity_ = fix.velocity;
   result.fix = fix;
   return result;

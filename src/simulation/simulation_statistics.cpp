@@ -58,7 +58,10 @@ double correlation_time(const std::vector<std::optional<Eigen::Vector2d>>& serie
 void SimulationStatistics::add(const SimulationEvent& event) {
   if (const auto* fix = std::get_if<FixEvent>(&event.content)) {
     if (fix->published.publisher != 0) return;
-    epochs_.push_back({event.stamp, std::nullopt, fix->published.fix.covariance(0, 0), fix->used_count});
+    const ReceiverFix& solution = fix->published.fix;
+    std::optional<double> claimed_variance_m2;
+    if (solution.covariance_type != CovarianceType::kUnknown) claimed_variance_m2 = solution.covariance(0, 0);
+    epochs_.push_back({event.stamp, std::nullopt, claimed_variance_m2, fix->used_count});
   } else if (const auto* truth = std::get_if<FixTruthEvent>(&event.content)) {
     // The truth of a fix follows it.
     if (!epochs_.empty() && epochs_.back().stamp == event.stamp) epochs_.back().error = truth->error.head<2>();
@@ -85,13 +88,14 @@ ReceiverSummary SimulationStatistics::summary() const {
     series.push_back(epoch.error);
     if (!epoch.error) continue;
     errors_m.push_back(epoch.error->norm());
-    sigmas_m.push_back(std::sqrt(epoch.claimed_variance_m2));
-    nees += epoch.error->squaredNorm() / epoch.claimed_variance_m2;
     used += epoch.used;
+    if (!epoch.claimed_variance_m2) continue;
+    sigmas_m.push_back(std::sqrt(*epoch.claimed_variance_m2));
+    nees += epoch.error->squaredNorm() / *epoch.claimed_variance_m2;
   }
   const auto count = static_cast<double>(errors_m.size());
   summary.availability = epochs_.empty() ? kNaN : count / static_cast<double>(epochs_.size());
-  summary.nees_mean = nees / count;
+  summary.nees_mean = nees / static_cast<double>(sigmas_m.size());
   summary.used_mean = used / count;
   summary.error_m = summarize(errors_m);
   summary.claimed_sigma_m = summarize(sigmas_m);

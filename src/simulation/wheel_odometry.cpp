@@ -3,11 +3,13 @@
 #include <cmath>
 #include <limits>
 
+#include "urban_gnss_localization/simulation/gauss_markov.hpp"
+
 namespace urban_gnss {
 namespace {
 
-// Slip has a stream of its own, so that other noise is the same with and without it.
-enum Stream : std::uint64_t { kOdometryStream = 211, kSlipStream = 212 };
+// Slip and wandering have streams of their own, so that other noise is the same with and without them.
+enum Stream : std::uint64_t { kOdometryStream = 211, kSlipStream = 212, kWanderStream = 213 };
 
 double square(double value) { return value * value; }
 
@@ -33,12 +35,15 @@ WheelOdometry::WheelOdometry(const WheelOdometryParameters& parameters, Drive dr
       wheelbase_m_(wheelbase_m),
       engine_(make_engine(seed, kOdometryStream)),
       slip_engine_(make_engine(seed, kSlipStream)),
+      wander_engine_(make_engine(seed, kWanderStream)),
       clock_(parameters.rate),
       left_(parameters.tick),
       right_(parameters.tick) {
   speed_scale_error_ = parameters_.speed_scale_sigma * draw_normal(engine_);
   yaw_rate_scale_error_ = parameters_.yaw_rate_scale_sigma * draw_normal(engine_);
   bias_radps_ = parameters_.yaw_rate_bias_sigma * draw_normal(engine_);
+  speed_scale_wander_ = draw_normal(wander_engine_);
+  yaw_rate_wander_ = draw_normal(wander_engine_);
   // Where a wheel stands within a tick at the start is unknown.
   left_.turn(parameters_.tick * draw_uniform(engine_));
   right_.turn(parameters_.tick * draw_uniform(engine_));
@@ -66,7 +71,7 @@ void WheelOdometry::turn_wheels(const Twist2& truth, double dt_s) {
   if (!(dt_s > 0.0) || (truth.speed_mps == 0.0 && truth.yaw_rate_radps == 0.0)) return;
   has_moved_ = true;
   const double distance = speed_scale() * truth.speed_mps * dt_s;
-  const double yaw = (yaw_rate_scale() * truth.yaw_rate_radps + bias_radps_) * dt_s;
+  const double yaw = (yaw_rate_scale() * truth.yaw_rate_radps + bias_radps_ + yaw_rate_wander_radps()) * dt_s;
   distance_m_ += distance;
   yaw_rad_ += yaw;
   if (!is_slipping_) return;
@@ -108,6 +113,8 @@ WheelOdometryMessage WheelOdometry::message() {
   message.pose = pose_;
 
   bias_radps_ += bias_step;
+  step_gauss_markov(speed_scale_wander_, period_s, parameters_.speed_scale_wander_time, wander_engine_);
+  step_gauss_markov(yaw_rate_wander_, period_s, parameters_.yaw_rate_wander_time, wander_engine_);
   has_moved_ = false;
   distance_m_ = yaw_rad_ = left_slip_m_ = right_slip_m_ = 0.0;
   return message;
@@ -142,9 +149,11 @@ void WheelOdometry::set_variances(WheelOdometryMessage& message) const {
   const double w = message.twist.yaw_rate_radps;
   const double tick_variance = square(p.tick * p.rate) / 6.0;  // (m/s)^2, of one encoder
   const double slip_variance = slip_probability() * square(p.slip_share);
-  message.speed_variance = square(p.speed_noise_density) * p.rate + square(p.speed_scale_sigma * v);
+  message.speed_variance =
+      square(p.speed_noise_density) * p.rate + square(p.speed_scale_sigma * v) + square(p.speed_scale_wander_sigma * v);
   message.yaw_rate_variance = square(p.yaw_rate_noise_density) * p.rate + square(p.yaw_rate_scale_sigma * w) +
-                              square(p.yaw_rate_bias_sigma) + square(p.yaw_rate_bias_walk) * message.stamp_s;
+                              square(p.yaw_rate_bias_sigma) + square(p.yaw_rate_bias_walk) * message.stamp_s +
+                              square(p.yaw_rate_wander_sigma);
   if (drive_ == Drive::kBicycle) {
     const double tangent = std::tan(bicycle_input(message.twist, wheelbase_m_).steering_rad);
     message.speed_variance += tick_variance + slip_variance * v * v;

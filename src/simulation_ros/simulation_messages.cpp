@@ -93,6 +93,10 @@ sensor_msgs::NavSatFix to_message(const FixEvent& event, const LocalFrame& local
     return message;
   }
   sensor_msgs::NavSatFix message = to_message(local.to_geodetic(published.fix.position), time, name);
+  if (published.fix.covariance_type == CovarianceType::kUnknown) {
+    message.position_covariance_type = sensor_msgs::NavSatFix::COVARIANCE_TYPE_UNKNOWN;
+    return message;
+  }
   for (int row = 0; row < 3; ++row) {
     for (int column = 0; column < 3; ++column) {
       message.position_covariance[static_cast<std::size_t>(3 * row + column)] = published.fix.covariance(row, column);

@@ -119,9 +119,13 @@ void print_summary(const ReceiverSummary& summary, std::ostream& out) {
       << summary.used_mean << " satellites in one\n"
       << "error           median " << summary.error_m.median << " m, 95 % " << summary.error_m.p95 << " m, max "
       << summary.error_m.max << " m, correlation time " << summary.correlation_time_s << " s\n"
-      << "claimed sigma   median " << summary.claimed_sigma_m.median << " m, NEES " << summary.nees_mean
-      << " (2 were honest)\n"
-      << "path class      share   range error median / 95 % of its size, m   C/N0 median, dB-Hz\n";
+      << "claimed sigma   ";
+  if (summary.claimed_sigma_m.count > 0) {
+    out << "median " << summary.claimed_sigma_m.median << " m, NEES " << summary.nees_mean << " (2 were honest)\n";
+  } else {
+    out << "none\n";
+  }
+  out << "path class      share   range error median / 95 % of its size, m   C/N0 median, dB-Hz\n";
   double all = 0.0;
   for (const PathClassSummary& of_class : summary.classes) all += static_cast<double>(of_class.count);
   for (const PathClassSummary& of_class : summary.classes) {

@@ -97,5 +97,18 @@ TEST(LocalizerExperiment, ContendersHaveTheSameDriveAndDoNotDisturbEachOther) {
   EXPECT_TRUE(both.outages.empty());
 }
 
+TEST(LocalizerExperiment, AReceiverThatDeclaresNoCovarianceIsGivenTheDefault) {
+  const Contender ukf{"ukf", [] { return std::make_unique<Ukf>(UkfParameters{}, MotionParameters{}); }, false};
+  const auto last_x = [&](bool declares_covariance, double fix_sigma_default) {
+    Scenario scenario = airfield(30.0);
+    scenario.receiver.declares_covariance = declares_covariance;
+    LocalizerExperimentConditions conditions;
+    conditions.localization.input.fix_validation.fix_sigma_default = fix_sigma_default;
+    return run_localizer_experiment(scenario, {ukf}, conditions, [](double) {}).estimates[0].back().pose.x;
+  };
+  EXPECT_NE(last_x(false, 3.0), last_x(false, 9.0));
+  EXPECT_EQ(last_x(true, 3.0), last_x(true, 9.0));
+}
+
 }  // namespace
 }  // namespace urban_gnss

@@ -196,6 +196,17 @@ class SimulateTest(unittest.TestCase):
                 self.assertEqual(fix.position_covariance_type, NavSatFix.COVARIANCE_TYPE_APPROXIMATED)
                 self.assertGreater(fix.position_covariance[0], 0.0)
 
+    def test_segway_has_wheels_and_late_fixes_and_nothing_else(self):
+        text = self.succeed("--scenario", "campus_segway", "--duration", 30, "--output", self.path("a.bag"))
+        self.assertIn("claimed sigma   none", text)
+        topics = {topic for topic, _, _ in self.messages("a.bag")}
+        self.assertEqual(topics - set(TRUTH), {"/odom", "/gps/fix", "/gps/datum", "/tf", "/tf_static"})
+        fixes = [fix for fix in self.of("a.bag", "/gps/fix") if fix.status.status == NavSatStatus.STATUS_FIX]
+        self.assertGreater(len(fixes), 25)
+        for fix in fixes:
+            self.assertEqual(fix.position_covariance_type, NavSatFix.COVARIANCE_TYPE_UNKNOWN)
+            self.assertEqual(fix.position_covariance, (0.0,) * 9)
+
     def test_summary(self):
         text = self.succeed("--scenario", "tunnel", "--without-lidar", "--json", self.path("a.json"))
         self.assertIn("tunnel, seed 1", text)

@@ -152,6 +152,80 @@ TEST(CityScenarios, FixTruthIsTheFixMinusTheAntenna) {
   EXPECT_GT(count, 360u);
 }
 
+TEST(CityScenarios, ALateFixIsWhereTheAntennaWas) {
+  const double delay_s = 1.5;
+  const Scenario late = scenario("open_sky", {"duration=60", "receiver.fix_delay=1.5", "imu.rate=0"});
+  const Events events = run(late);
+  expect_ascending(events);
+  EXPECT_TRUE(of<ImuMessage>(events, late).empty());
+  std::map<Stamp, Vector3d> antennas;
+  for (const auto& truth : of<TruthEvent>(events, late)) {
+    const Pose2& pose = truth.content->pose;
+    const Vector3d arm = late.vehicle.antenna();
+    antennas[late.start_time + from_seconds(truth.time_s)] = {
+        pose.x + std::cos(pose.yaw) * arm.x() - std::sin(pose.yaw) * arm.y(),
+        pose.y + std::sin(pose.yaw) * arm.x() + std::cos(pose.yaw) * arm.y(), arm.z()};
+  }
+  const auto fixes = own_fixes(events);
+  double then_m = 0.0;
+  double now_m = 0.0;
+  double count = 0.0;
+  for (const auto& truth : of<FixTruthEvent>(events, late)) {
+    const Stamp stamp = late.start_time + from_seconds(truth.time_s);
+    const Vector3d place = fixes.at(stamp).fix.position;
+    EXPECT_LT((place - antennas.at(stamp) - truth.content->error).norm(), 1e-9);
+    if (truth.time_s < 15.0) continue;  // it drives
+    then_m += (place - antennas.at(stamp - from_seconds(delay_s))).head<2>().norm();
+    now_m += truth.content->error.head<2>().norm();
+    count += 1.0;
+  }
+  EXPECT_GT(count, 200.0);
+  EXPECT_LT(then_m / count, 4.0);
+  EXPECT_GT(now_m / count, 7.0) << "some 10 m/s for 1.5 s";
+}
+
+TEST(CityScenarios, SegwayOdometryIsOffAsRecorded) {
+  const Scenario segway = scenario("campus_segway");
+  const std::map<double, double> recorded_rad{{1.0, 0.018}, {10.0, 0.08}, {30.0, 0.13}};  // by time in s
+  std::map<double, double> squares;
+  double distance_m = 0.0;
+  const int seeds = 4000;
+  const Twist2 straight{segway.route.waypoints.front().speed_mps, 0.0};
+  for (int seed = 0; seed < seeds; ++seed) {
+    WheelOdometry odometry(segway.odometry, segway.vehicle.drive, 0.0, static_cast<std::uint64_t>(seed));
+    double yaw_rad = 0.0;
+    for (int i = 1; i <= 1500; ++i) {
+      const auto message = odometry.advance(straight, 0.02);
+      ASSERT_TRUE(message);
+      yaw_rad += 0.02 * message->twist.yaw_rate_radps;
+      distance_m += 0.02 * message->twist.speed_mps;
+      if (recorded_rad.count(i / 50.0) > 0) squares[i / 50.0] += yaw_rad * yaw_rad;
+    }
+  }
+  // 8 % is what one process leaves of the recorded figures, to which comes 5 sigma of a root of a mean of squares.
+  for (const auto& [time_s, recorded] : recorded_rad) {
+    const double rms_rad = std::sqrt(squares[time_s] / seeds);
+    RecordProperty("yaw_rms_rad_" + std::to_string(static_cast<int>(time_s)) + "_s", std::to_string(rms_rad));
+    EXPECT_NEAR(rms_rad / recorded, 1.0, 0.08 + 5.0 / std::sqrt(2.0 * seeds)) << time_s << " s: " << rms_rad;
+  }
+  EXPECT_NEAR(distance_m / (seeds * 30.0 * straight.speed_mps), 1.07, 0.005);
+}
+
+TEST(CityScenarios, SegwayPublishesFixesAlone) {
+  const Scenario segway = scenario("campus_segway", {"duration=60"});
+  const Events events = run(segway);
+  expect_ascending(events);
+  EXPECT_TRUE(of<ImuMessage>(events, segway).empty());
+  EXPECT_TRUE(of<SatellitesEvent>(events, segway).empty());
+  const auto fixes = own_fixes(events);
+  EXPECT_EQ(fixes.size(), 59u) << "one a second; the last is still on its way";
+  for (const auto& [stamp, fix] : fixes) {
+    if (!fix.has_fix) continue;
+    EXPECT_EQ(fix.fix.covariance_type, CovarianceType::kUnknown);
+    EXPECT_EQ(fix.fix.velocity_sigma_mps, 0.0);
+  }
+}
+
 TEST(CityScenarios, SatellitesAreReportedInWholeDegrees) {
   const Scenario city = scenario("downtown_grid", {"duration=20", "lidar.type=none"});
   const Events events = run(city);

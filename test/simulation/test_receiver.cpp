@@ -41,6 +41,24 @@ TEST(Receiver, ClaimsUereTimesDilutionWhateverHappens) {
   EXPECT_GT(epoch.fix->position.head<2>().norm(), 3.0 * std::sqrt(epoch.fix->covariance(0, 0)));
 }
 
+TEST(Receiver, MayDeclareNeitherCovarianceNorVelocity) {
+  ReceiverParameters silent;
+  silent.declares_covariance = silent.publishes_velocity = false;
+  Receiver with(ReceiverParameters{}, 3);
+  Receiver without(silent, 3);
+  for (int i = 0; i < 50; ++i) {
+    const ReceiverEpoch usual = with.epoch(kEpoch, {2.0 * i, 0.0, 0.0}, {10.0, 0.0, 0.0}, open_sky());
+    const ReceiverEpoch epoch = without.epoch(kEpoch, {2.0 * i, 0.0, 0.0}, {10.0, 0.0, 0.0}, open_sky());
+    ASSERT_EQ(epoch.fix.has_value(), usual.fix.has_value());
+    if (!epoch.fix) continue;
+    EXPECT_EQ(usual.fix->covariance_type, CovarianceType::kApproximated);
+    EXPECT_GT(usual.fix->velocity_sigma_mps, 0.0);
+    EXPECT_EQ(epoch.fix->covariance_type, CovarianceType::kUnknown);
+    EXPECT_EQ(epoch.fix->velocity_sigma_mps, 0.0);
+    EXPECT_EQ(epoch.fix->position, usual.fix->position) << "smoothed with the velocity all the same";
+  }
+}
+
 TEST(Receiver, ReportsWhatReceiversReport) {
   Receiver receiver(ReceiverParameters{}, 3);
   auto sky = open_sky();

@@ -91,8 +91,10 @@ TEST(WheelOdometry, ScaleAndBiasAreWhatTheySay) {
 }
 
 TEST(WheelOdometry, StandingRobotTurnsNoWheel) {
+  WheelOdometryParameters parameters;
+  parameters.yaw_rate_wander_sigma = parameters.speed_scale_wander_sigma = 0.1;
   for (const Drive kind : kDrives) {
-    WheelOdometry odometry({}, kind, kWheelbase_m, 3);
+    WheelOdometry odometry(parameters, kind, kWheelbase_m, 3);
     drive(odometry, {5.0, 0.1}, 2.0);
     const Pose2 before = odometry.pose();
     for (const auto& message : drive(odometry, {}, 20.0)) {
@@ -169,6 +171,83 @@ TEST(WheelOdometry, BiasWalks) {
   EXPECT_NEAR(squares / seeds / (1e-6 * 25.0), 1.0, 5.0 * std::sqrt(2.0 / seeds));
 }
 
+/// Variance of the integral over `time_s` of a stationary Gauss-Markov process of this sigma and correlation time.
+double integral_variance(double sigma, double correlation_s, double time_s) {
+  const double times = time_s / correlation_s;
+  return 2.0 * std::pow(sigma * correlation_s, 2) * (times - 1.0 + std::exp(-times));
+}
+
+TEST(WheelOdometry, YawRateAndSpeedScaleWander) {
+  WheelOdometryParameters parameters = perfect();
+  parameters.yaw_rate_wander_sigma = 0.022;
+  parameters.yaw_rate_wander_time = 0.6;
+  parameters.speed_scale_wander_sigma = 0.05;
+  parameters.speed_scale_wander_time = 10.0;
+  constexpr double kSpeed_mps = 1.3;
+  const std::vector<double> times_s{1.0, 10.0, 30.0};
+  for (const Drive kind : kDrives) {
+    std::vector<double> yaw_squares(times_s.size());
+    std::vector<double> distance_squares(times_s.size());
+    const int seeds = 1000;
+    for (int seed = 0; seed < seeds; ++seed) {
+      WheelOdometry odometry(parameters, kind, kWheelbase_m, static_cast<std::uint64_t>(seed));
+      const auto messages = drive(odometry, {kSpeed_mps, 0.0}, 30.0, 0.02);
+      double distance_m = 0.0;
+      for (std::size_t i = 0, k = 0; i < messages.size(); ++i) {
+        distance_m += messages[i].twist.speed_mps / parameters.rate;
+        if (messages[i].stamp_s < times_s[k] - 1e-9) continue;
+        yaw_squares[k] += std::pow(messages[i].pose.yaw, 2);
+        distance_squares[k] += std::pow(distance_m / kSpeed_mps - times_s[k], 2);
+        ++k;
+      }
+    }
+    // 5 sigma of a mean of squares of a normal variable.
+    const double band = 5.0 * std::sqrt(2.0 / seeds);
+    for (std::size_t k = 0; k < times_s.size(); ++k) {
+      EXPECT_NEAR(yaw_squares[k] / seeds / integral_variance(0.022, 0.6, times_s[k]), 1.0, band) << times_s[k];
+      EXPECT_NEAR(distance_squares[k] / seeds / integral_variance(0.05, 10.0, times_s[k]), 1.0, band) << times_s[k];
+    }
+  }
+}
+
+TEST(WheelOdometry, WanderingLeavesTheOtherNoise) {
+  WheelOdometryParameters parameters;
+  parameters.tick = 0.0;  // which mixes the errors of speed and yaw rate
+  WheelOdometryParameters off = parameters;
+  off.yaw_rate_wander_time = off.speed_scale_wander_time = 3.0;
+  WheelOdometryParameters wandering = off;
+  wandering.yaw_rate_wander_sigma = 0.02;
+  const auto measured = [](const WheelOdometryParameters& p) {
+    WheelOdometry odometry(p, Drive::kDifferential, 0.0, 8);
+    return drive(odometry, {1.3, 0.1}, 300.0);
+  };
+  const auto usual = measured(parameters);
+  const auto without = measured(off);
+  const auto with = measured(wandering);
+  double largest_radps = 0.0;
+  for (std::size_t i = 0; i < usual.size(); ++i) {
+    ASSERT_EQ(without[i].twist.speed_mps, usual[i].twist.speed_mps);
+    ASSERT_EQ(without[i].twist.yaw_rate_radps, usual[i].twist.yaw_rate_radps);
+    ASSERT_EQ(without[i].yaw_rate_variance, usual[i].yaw_rate_variance);
+    // What a slipping wheel turns too much is a share of its turn, wandering included.
+    ASSERT_NEAR(with[i].twist.speed_mps, usual[i].twist.speed_mps, 0.01);
+    largest_radps = std::max(largest_radps, std::abs(with[i].twist.yaw_rate_radps - usual[i].twist.yaw_rate_radps));
+  }
+  EXPECT_GT(largest_radps, 0.04);
+  EXPECT_LT(largest_radps, 0.12) << "six sigma";
+}
+
+TEST(WheelOdometry, WheelsMayBeOfAnotherSize) {
+  for (const Drive kind : kDrives) {
+    WheelOdometryParameters parameters = perfect();
+    parameters.speed_scale = 1.07;
+    WheelOdometry odometry(parameters, kind, kWheelbase_m, 1);
+    const Twist2 twist = drive(odometry, {1.3, 0.2}, 1.0).back().twist;
+    EXPECT_NEAR(twist.speed_mps, 1.07 * 1.3, 1e-9);
+    EXPECT_NEAR(twist.yaw_rate_radps, 0.2, 1e-9);
+  }
+}
+
 /// Mean squared error over declared variance at one moment, over many runs: 1 where the variances are honest.
 void expect_consistent(const WheelOdometryParameters& parameters, Drive kind, double band) {
   const int seeds = 4000;
@@ -204,6 +283,11 @@ TEST(WheelOdometry, VariancesAreHonest) {
     slow.yaw_rate_bias_walk = 0.01;
     slow.yaw_rate_noise_density = 0.001;
     expect_consistent(slow, kind, 0.11);
+
+    WheelOdometryParameters wandering = perfect();
+    wandering.speed_scale_wander_sigma = 0.02;
+    wandering.yaw_rate_wander_sigma = 0.02;
+    expect_consistent(wandering, kind, 0.11);
   }
 }
 

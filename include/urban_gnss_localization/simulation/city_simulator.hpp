@@ -1,5 +1,6 @@
 #pragma once
 
+#include <deque>
 #include <map>
 #include <vector>
 
@@ -31,6 +32,11 @@ class CitySimulator : public Simulator {
   double elapsed_s() const { return to_seconds(now_ - scenario_.start_time); }
 
  private:
+  struct AntennaState {
+    Eigen::Vector3d position;  ///< m, map frame
+    Eigen::Vector3d velocity;  ///< m/s, map frame
+  };
+  AntennaState antenna_state() const { return {vehicle_.antenna_position(), vehicle_.antenna_velocity()}; }
   void receive(double interval_s);
   void add(Stamp published, SimulationEvent event);
   template <class Content>
@@ -52,6 +58,7 @@ class CitySimulator : public Simulator {
   std::vector<Car> cars_;
   SampleClock epoch_clock_;
   double interval_s_;
+  std::deque<AntennaState> antenna_history_;  ///< of the receiver's fix_delay: the first is what it measures now
   long steps_{0};
   Stamp now_;
   std::multimap<Stamp, SimulationEvent> pending_;  ///< by the time of their publication

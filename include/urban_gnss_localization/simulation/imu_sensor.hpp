@@ -26,7 +26,7 @@ struct ImuParameters {
   double acceleration_bias_walk{2e-4};
 
   void visit(ParameterVisitor& v) {
-    v("rate", rate, between(1.0, 1000.0), "", "Hz");
+    v("rate", rate, between(0.0, 1000.0), "", "Hz; 0: no IMU");
     v("gyro_noise_density", gyro_noise_density, non_negative(), "", "rad/s/sqrt(Hz)");
     v("gyro_bias_sigma", gyro_bias_sigma, non_negative(), "rad/s", "of each axis's bias at the start");
     v("gyro_bias_walk", gyro_bias_walk, non_negative(), "", "rad/s/sqrt(s)");

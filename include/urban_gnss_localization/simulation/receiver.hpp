@@ -9,6 +9,7 @@
 #include "urban_gnss_localization/common/parameters.hpp"
 #include "urban_gnss_localization/common/random.hpp"
 #include "urban_gnss_localization/geometry/angles.hpp"
+#include "urban_gnss_localization/gnss/fix.hpp"
 #include "urban_gnss_localization/gnss/satellite.hpp"
 #include "urban_gnss_localization/simulation/position_solution.hpp"
 #include "urban_gnss_localization/simulation/pseudoranges.hpp"
@@ -32,6 +33,10 @@ struct ReceiverParameters {
   double angle_resolution{kPi / 180.0};
   double latency_min{0.05};
   double latency_max{0.2};
+  double fix_delay{0.0};
+  bool declares_covariance{true};
+  bool publishes_velocity{true};
+  bool publishes_satellites{true};
 
   void visit(ParameterVisitor& v) {
     v("rate", rate, between(0.1, 50.0), "Hz", "of epochs; for the caller, who passes the interval");
@@ -53,6 +58,12 @@ struct ReceiverParameters {
       "reported azimuth and elevation are rounded to it; 0 = not rounded");
     v("latency_min", latency_min, non_negative(), "s", "from the epoch to the publication");
     v("latency_max", latency_max, non_negative(), "", "s");
+    v("fix_delay", fix_delay, between(0.0, 60.0), "s",
+      "by which the stamp is later than what it stands on: position, velocity and satellites are those of so long "
+      "before; for the caller, who passes them");
+    v("declares_covariance", declares_covariance, "false: the fix says that its covariance is unknown");
+    v("publishes_velocity", publishes_velocity, "false: the velocity from Doppler smooths the fix and nothing else");
+    v("publishes_satellites", publishes_satellites, "for the caller, who publishes them");
   }
   void check(std::vector<std::string>& faults) const;
 };
@@ -80,10 +91,11 @@ std::vector<SatelliteObservation> to_observations(const std::vector<SatelliteRep
 struct ReceiverFix {
   Eigen::Vector3d position{Eigen::Vector3d::Zero()};  ///< m, of the antenna, map frame (east, north, up)
   /// m^2, east, north, up: diag((uere HDOP)^2, (uere HDOP)^2, (uere VDOP)^2) over all satellites used, as drivers of
-  /// NMEA receivers make it; CovarianceType::kApproximated.
+  /// NMEA receivers make it.
   Eigen::Matrix3d covariance{Eigen::Matrix3d::Identity()};
-  Eigen::Vector3d velocity{Eigen::Vector3d::Zero()};  ///< m/s, from Doppler
-  double velocity_sigma_mps{0.0};                     ///< claimed, per axis
+  CovarianceType covariance_type{CovarianceType::kApproximated};  ///< kUnknown: the covariance is not published
+  Eigen::Vector3d velocity{Eigen::Vector3d::Zero()};              ///< m/s, from Doppler
+  double velocity_sigma_mps{0.0};                                 ///< claimed, per axis; 0: not published
 };
 
 struct ReceiverEpoch {

@@ -7,7 +7,7 @@ namespace urban_gnss {
 /// The instants k / rate, k = 1, 2, ..., at which a simulated sensor delivers, in seconds since its start.
 class SampleClock {
  public:
-  /// `rate_hz` > 0.
+  /// `rate_hz` >= 0; with 0 it is never due.
   explicit SampleClock(double rate_hz) : rate_hz_(rate_hz) {}
 
   double period_s() const { return 1.0 / rate_hz_; }

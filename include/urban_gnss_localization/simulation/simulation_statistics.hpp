@@ -26,7 +26,7 @@ struct ReceiverSummary {
   double availability{0.0};        ///< share of the epochs with a finite fix
   Summary error_m;                 ///< horizontal
   double correlation_time_s{0.0};  ///< of the horizontal error, see correlation_time(); NaN where it is not known
-  Summary claimed_sigma_m;         ///< per axis
+  Summary claimed_sigma_m;         ///< per axis; empty where the receiver declares no covariance
   double nees_mean{0.0};           ///< of the horizontal error against the claimed covariance; 2 where that is honest
   double used_mean{0.0};           ///< satellites in a fix
   std::array<PathClassSummary, 4> classes;
@@ -47,7 +47,7 @@ class SimulationStatistics {
   struct Epoch {
     Stamp stamp{0};
     std::optional<Eigen::Vector2d> error;
-    double claimed_variance_m2{0.0};
+    std::optional<double> claimed_variance_m2;
     int used{0};
   };
   std::vector<Epoch> epochs_;

@@ -42,7 +42,7 @@ struct TruthEvent {
 
 /// What is wrong with the receiver's fix.
 struct FixTruthEvent {
-  Eigen::Vector3d error{Eigen::Vector3d::Zero()};  ///< m, east, north, up: fix minus antenna
+  Eigen::Vector3d error{Eigen::Vector3d::Zero()};  ///< m, east, north, up: fix minus antenna at the fix's stamp
   std::optional<bool> in_shadow;                   ///< of the paper's field, which has nothing but a shadow
 };
 

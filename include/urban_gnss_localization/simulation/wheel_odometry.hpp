@@ -14,13 +14,19 @@
 
 namespace urban_gnss {
 
-/// Errors of the size seen in recordings: speed scale 0.3-2.5 %, yaw-rate bias 0.001-0.006 rad/s.
+/// Errors of the size seen in recordings: speed scale 0.3-2.5 %, yaw-rate bias 0.001-0.006 rad/s. The wheels of a
+/// Segway on a campus are worse: scenarios/campus_segway.yaml has theirs.
 struct WheelOdometryParameters {
   double rate{50.0};
+  double speed_scale{1.0};
   double speed_scale_sigma{0.01};
+  double speed_scale_wander_sigma{0.0};
+  double speed_scale_wander_time{10.0};
   double yaw_rate_scale_sigma{0.01};
   double yaw_rate_bias_sigma{0.003};
   double yaw_rate_bias_walk{5e-5};
+  double yaw_rate_wander_sigma{0.0};
+  double yaw_rate_wander_time{1.0};
   double speed_noise_density{0.005};
   double yaw_rate_noise_density{5e-4};
   double tick{0.0005};
@@ -32,11 +38,19 @@ struct WheelOdometryParameters {
 
   void visit(ParameterVisitor& v) {
     v("rate", rate, between(1.0, 1000.0), "", "Hz");
+    v("speed_scale", speed_scale, between(0.5, 2.0), "",
+      "mean factor on the speed: wheels that are not as big as said");
     v("speed_scale_sigma", speed_scale_sigma, between(0.0, 0.2), "", "of the factor on the speed, drawn once a run");
+    v("speed_scale_wander_sigma", speed_scale_wander_sigma, between(0.0, 0.2), "",
+      "of what the factor on the speed wanders about it; 0: no wandering");
+    v("speed_scale_wander_time", speed_scale_wander_time, positive(), "s", "correlation time of this wandering");
     v("yaw_rate_scale_sigma", yaw_rate_scale_sigma, between(0.0, 0.2), "",
       "of the factor on the yaw rate, drawn once a run");
     v("yaw_rate_bias_sigma", yaw_rate_bias_sigma, non_negative(), "rad/s", "of the bias at the start");
     v("yaw_rate_bias_walk", yaw_rate_bias_walk, non_negative(), "", "rad/s/sqrt(s)");
+    v("yaw_rate_wander_sigma", yaw_rate_wander_sigma, non_negative(), "rad/s",
+      "of an error of the yaw rate that comes and goes while the robot moves; 0: none");
+    v("yaw_rate_wander_time", yaw_rate_wander_time, positive(), "s", "correlation time of this error");
     v("speed_noise_density", speed_noise_density, non_negative(), "", "m/s/sqrt(Hz)");
     v("yaw_rate_noise_density", yaw_rate_noise_density, non_negative(), "", "rad/s/sqrt(Hz)");
     v("tick", tick, non_negative(), "m", "of wheel travel per encoder tick; 0: none");
@@ -58,16 +72,19 @@ struct WheelOdometryMessage {
 
 /// Encoders on the wheels of a Vehicle.
 ///
-/// Speed v and yaw rate w are measured as (1 + a) v + noise and (1 + b) w + bias(t) + noise, with a, b drawn once. Then
-/// come slip, which starts and ends with a step, and quantisation: for bicycle the driven axle has one encoder, which
-/// slips as a whole, and the steering angle a resolution, yaw rate by eq. (4); for differential each wheel has an
-/// encoder, and one of them at random slips. Ticks are counted from the start, so that quantisation does not add up. A
-/// robot that stands turns no wheel: its messages are exactly zero.
+/// Speed v and yaw rate w are measured as (s + a + c(t)) v + noise and (1 + b) w + bias(t) + d(t) + noise. a, b are
+/// drawn once; c, d wander as stationary first-order Gauss-Markov processes, so that d of sigma S and time T turns the
+/// heading by a random walk of S sqrt(2 T) rad/sqrt(s) in the long run. Then come slip, which starts and ends with a
+/// step, and quantisation: for bicycle the driven axle has one encoder, which slips as a whole, and the steering angle
+/// a resolution, yaw rate by eq. (4); for differential each wheel has an encoder, and one of them at random slips.
+/// Ticks are counted from the start, so that quantisation does not add up. A robot that stands turns no wheel: its
+/// messages are exactly zero.
 ///
 /// The variances are those of the error of one message over all runs: noise density^2 * rate, tick^2/6 per message
 /// period^2 (the difference of two uniform errors), steering resolution^2/12, (scale sigma * twist)^2, initial bias and
-/// its walk up to now, and the mean square of slip. At a stand they are therefore too large; and the errors from scale
-/// and bias stay from message to message, which a filter that takes them for white does not know.
+/// its walk up to now, the wandering, and the mean square of slip; not the mean scale s, which is nowhere known. At a
+/// stand they are therefore too large; and the errors from scale, bias and wandering stay from message to message,
+/// which a filter that takes them for white does not know.
 class WheelOdometry {
  public:
   /// `wheelbase_m` is used for bicycle only. Requires parameters without faults.
@@ -77,10 +94,13 @@ class WheelOdometry {
   /// several fall due in one step, all are integrated and the last is returned.
   std::optional<WheelOdometryMessage> advance(const Twist2& truth, double dt_s);
 
-  /// What a localizer cannot know: the factors and the present bias.
-  double speed_scale() const { return 1.0 + speed_scale_error_; }
+  /// What a localizer cannot know: the factors, the bias and the wandering, as they are now.
+  double speed_scale() const {
+    return parameters_.speed_scale + speed_scale_error_ + parameters_.speed_scale_wander_sigma * speed_scale_wander_;
+  }
   double yaw_rate_scale() const { return 1.0 + yaw_rate_scale_error_; }
   double yaw_rate_bias_radps() const { return bias_radps_; }
+  double yaw_rate_wander_radps() const { return parameters_.yaw_rate_wander_sigma * yaw_rate_wander_; }
   bool is_slipping() const { return is_slipping_; }
   /// In the odom frame, as of the last message.
   const Pose2& pose() const { return pose_; }
@@ -113,11 +133,14 @@ class WheelOdometry {
   double wheelbase_m_;
   RandomEngine engine_;
   RandomEngine slip_engine_;
+  RandomEngine wander_engine_;
   SampleClock clock_;
   double time_s_{0.0};
   double speed_scale_error_{0.0};
   double yaw_rate_scale_error_{0.0};
   double bias_radps_{0.0};
+  double speed_scale_wander_{0.0};  ///< of variance 1
+  double yaw_rate_wander_{0.0};     ///< likewise
   bool is_slipping_{false};
   bool slips_left_{false};
   double slip_change_s_{0.0};  ///< when the slip starts or ends

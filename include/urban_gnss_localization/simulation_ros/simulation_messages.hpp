@@ -43,7 +43,7 @@ nav_msgs::Odometry to_message(const OdometryEvent& event, const ros::Time& time,
 nav_msgs::Odometry to_message(const TruthEvent& event, const ros::Time& time, const Frames& frames);
 sensor_msgs::Imu to_message(const ImuMessage& imu, const ros::Time& time, const std::string& frame);
 /// The k-th additional publisher's frame is `frame` with "_k" behind it. Without a fix the status says so and the
-/// position is NaN.
+/// position is NaN. Without a declared covariance it is zero, of unknown type.
 sensor_msgs::NavSatFix to_message(const FixEvent& event, const LocalFrame& local, const ros::Time& time,
                                   const std::string& frame);
 /// Axes of the map frame. Requires a fix.
