@@ -20,9 +20,11 @@ double position_sigma(const Eigen::Matrix3d& covariance) {
   return variance >= 0.0 ? std::sqrt(variance) : kNan;
 }
 
-double normalized_error_squared(const Eigen::Vector3d& error, const Eigen::Matrix3d& covariance) {
+template <int N>
+double normalized_error_squared(const Eigen::Matrix<double, N, 1>& error,
+                                const Eigen::Matrix<double, N, N>& covariance) {
   if (!error.allFinite() || !covariance.allFinite()) return kNan;
-  const Eigen::LLT<Eigen::Matrix3d> factor(covariance);
+  const Eigen::LLT<Eigen::Matrix<double, N, N>> factor(covariance);
   return factor.info() == Eigen::Success ? factor.matrixL().solve(error).squaredNorm() : kNan;
 }
 
@@ -35,7 +37,8 @@ ErrorSample error_sample(const Pose2& truth, const TimedPose& estimate) {
   sample.estimate = estimate.pose;
   sample.truth = truth;
   sample.position_sigma_m = position_sigma(estimate.covariance);
-  sample.nees = normalized_error_squared({offset.x(), offset.y(), sample.heading_error_rad}, estimate.covariance);
+  sample.nees = normalized_error_squared<3>({offset.x(), offset.y(), sample.heading_error_rad}, estimate.covariance);
+  sample.position_nees = normalized_error_squared<2>(offset, estimate.covariance.topLeftCorner<2, 2>());
   return sample;
 }
 

@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <deque>
 #include <utility>
 
 #include "urban_gnss_localization/experiments/city_drive.hpp"
+#include "urban_gnss_localization/experiments/faulty_participant.hpp"
 #include "urban_gnss_localization/geometry/isometry.hpp"
 #include "urban_gnss_localization/geometry/local_frame.hpp"
 #include "urban_gnss_localization/pipeline/bias_responder.hpp"
@@ -12,21 +14,22 @@
 namespace urban_gnss {
 namespace {
 
+constexpr Stamp kHealthInterval = std::chrono::milliseconds(100);
+
 /// A contender's localizer with its pipelines.
-class Participant : public DriveParticipant {
+class Participant : public LocalizingParticipant {
  public:
   Participant(const Contender& contender, const Scenario& scenario, const LocalizerExperimentConditions& conditions,
-              Trajectory& estimate)
+              Trajectory& estimate, std::vector<HealthSample>& health)
       : frame_(scenario.datum),
         localization_(conditions.localization, contender.make()),
         bias_responder_(conditions.bias),
-        estimate_(estimate) {
-    const Eigen::Vector3d antenna = scenario.vehicle.antenna();
-    localization_.set_antenna_offset(antenna.head<2>());
+        antenna_(scenario.vehicle.antenna()),
+        estimate_(estimate),
+        health_(health) {
+    if (contender.uses_occlusion) occlusion_ = std::make_unique<OcclusionPipeline>(conditions.occlusion);
     localization_.set_datum(scenario.datum);
-    if (!contender.uses_occlusion) return;
-    occlusion_ = std::make_unique<OcclusionPipeline>(conditions.occlusion);
-    occlusion_->set_antenna(antenna);
+    move_antenna(0.0);
   }
 
   bool wants_clouds() const override { return occlusion_ != nullptr; }
@@ -38,6 +41,8 @@ class Participant : public DriveParticipant {
   void add_odometry(const OdometrySample& sample) override {
     localization_.add_odometry(sample);
     settle();
+    if (!health_.empty() && sample.stamp - health_.back().stamp < kHealthInterval) return;
+    health_.push_back({sample.stamp, localization_.report().healthy});
   }
 
   void add_cloud(Stamp stamp, const PointCloud& cloud, const Eigen::Isometry3d& sensor_in_base,
@@ -72,6 +77,21 @@ class Participant : public DriveParticipant {
     settle();
   }
 
+  void set_pose_aside(double left_m) override {
+    constexpr double kPositionVariance_m2 = 0.25;
+    constexpr double kYawVariance_rad2 = kPi * kPi / 144.0;
+    PoseEstimate wrong;
+    wrong.pose = compose(localization_.localizer().pose(), {0.0, left_m, 0.0});
+    wrong.covariance = Eigen::Vector3d(kPositionVariance_m2, kPositionVariance_m2, kYawVariance_rad2).asDiagonal();
+    localization_.set_pose(wrong);
+  }
+
+  void move_antenna(double forward_m) override {
+    antenna_.x() += forward_m;
+    localization_.set_antenna_offset(antenna_.head<2>());
+    if (occlusion_) occlusion_->set_antenna(antenna_);
+  }
+
  private:
   void settle() {
     bias_responder_.answer(localization_);
@@ -89,7 +109,9 @@ class Participant : public DriveParticipant {
   LocalizationPipeline localization_;
   BiasResponder bias_responder_;
   std::unique_ptr<OcclusionPipeline> occlusion_;
+  Eigen::Vector3d antenna_;  ///< m, in the base frame, as it is told
   Trajectory& estimate_;
+  std::vector<HealthSample>& health_;
 };
 
 /// Looks for times without fixes.
@@ -135,14 +157,18 @@ LocalizerRun run_localizer_experiment(const Scenario& scenario, const std::vecto
                                       const std::function<void(double)>& on_progress) {
   LocalizerRun run;
   run.estimates.resize(contenders.size());
-  std::vector<std::unique_ptr<DriveParticipant>> participants;
+  run.health.resize(contenders.size());
+  const Stamp fault_onset = scenario.start_time + from_seconds(conditions.fault_onset_s);
+  std::deque<Participant> participants;
+  std::deque<FaultyParticipant> faulty;
+  OutageWatch outage_watch(run.outages);
+  std::vector<DriveParticipant*> all{&outage_watch};
   for (std::size_t i = 0; i < contenders.size(); ++i) {
-    participants.push_back(std::make_unique<Participant>(contenders[i], scenario, conditions, run.estimates[i]));
+    Participant& told = participants.emplace_back(contenders[i], scenario, conditions, run.estimates[i], run.health[i]);
+    all.push_back(&faulty.emplace_back(contenders[i].fault, fault_onset, told));
   }
-  participants.push_back(std::make_unique<OutageWatch>(run.outages));
-  std::vector<DriveParticipant*> all;
-  for (const auto& each : participants) all.push_back(each.get());
   run.truth = drive_city(scenario, conditions.cloud_every, all, on_progress).truth;
+  for (const FaultyParticipant& each : faulty) run.fault_begins.push_back(each.begin());
   return run;
 }
 

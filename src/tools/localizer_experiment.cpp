@@ -1,4 +1,5 @@
-// Localizers on simulated scenarios: every one on the same drives, with their errors against the truth.
+// Localizers on simulated scenarios: every one on the same drives, with their errors against the truth; or what faults
+// of their inputs do to them.
 
 #include "urban_gnss_localization/experiments/localizer_experiment.hpp"
 
@@ -17,6 +18,7 @@
 #include "overrides.hpp"
 #include "scenario_runs.hpp"
 #include "urban_gnss_localization/evaluation/report_json.hpp"
+#include "urban_gnss_localization/experiments/fault_experiment.hpp"
 #include "urban_gnss_localization/geometry/angles.hpp"
 #include "urban_gnss_localization/localizers/registry.hpp"
 #include "urban_gnss_localization/pipeline/bias_pipeline.hpp"
@@ -33,6 +35,8 @@ struct Options {
   std::vector<std::string> localizers;
   std::vector<std::string> overrides;
   std::string json_file;
+  bool faults = false;
+  double fault_onset_s = 60.0;
 };
 
 /// All variants of the registry, and after each that gains from it the same behind the occlusion node.
@@ -107,60 +111,146 @@ nlohmann::json to_json(const ContenderSummary& summary) {
   return json;
 }
 
+/// A number that is not known is a dash, an infinite one `if_infinite`.
+void print_cell(double value, int width, int digits, const std::string& if_infinite = "inf") {
+  std::ostringstream text;
+  if (std::isnan(value)) {
+    text << '-';
+  } else if (std::isinf(value)) {
+    text << if_infinite;
+  } else {
+    text << std::fixed << std::setprecision(digits) << value;
+  }
+  std::cout << std::setw(width) << text.str();
+}
+
 void print_row(const std::string& name, const ContenderSummary& s) {
-  const auto cell = [](double value, int width, int digits) {
-    std::ostringstream text;
-    if (std::isnan(value)) {
-      text << '-';
-    } else {
-      text << std::fixed << std::setprecision(digits) << value;
-    }
-    std::cout << std::setw(width) << text.str();
-  };
   std::cout << std::left << std::setw(28) << name << std::right;
   for (const double metres : {s.position_m.rmse, s.position_m.median, s.position_m.p95, s.position_m.max}) {
-    cell(metres, 9, 2);
+    print_cell(metres, 9, 2);
   }
-  cell(radians_to_degrees(s.heading_rmse_rad), 13, 2);
-  cell(s.nees_mean, 9, 2);
-  cell(100.0 * s.coverage, 10, 1);
+  print_cell(radians_to_degrees(s.heading_rmse_rad), 13, 2);
+  print_cell(s.nees_mean, 9, 2);
+  print_cell(100.0 * s.coverage, 10, 1);
   std::cout << std::setw(10) << s.diverged;
-  cell(s.reacquisition_s, 12, 1);
+  print_cell(s.reacquisition_s, 12, 1);
   std::cout << '\n';
 }
 
-void run_all(const Options& options, const std::string& command) {
-  const YAML::Node sections = read_sections(options.overrides, standard_localizers());
-  const LocalizerExperimentConditions conditions = read_conditions(sections);
-  const std::vector<Contender> contenders = select_contenders(options, sections);
-  const auto start = std::chrono::steady_clock::now();
-  const std::vector<std::vector<LocalizerRun>> runs =
-      run_scenarios(options.runs, [&](const Scenario& scenario, const std::function<void(double)>& on_progress) {
-        return run_localizer_experiment(scenario, contenders, conditions, on_progress);
-      });
+/// Prints the errors of every contender in one scenario. The same as JSON.
+nlohmann::json report_errors(const std::vector<Contender>& contenders, const std::vector<LocalizerRun>& runs) {
+  std::cout << std::left << std::setw(28) << "position error, m" << std::right
+            << "     rmse   median      p95      max  heading, deg     NEES  coverage  diverged  back after\n";
+  nlohmann::json json;
+  for (std::size_t c = 0; c < contenders.size(); ++c) {
+    const ContenderSummary summary = summarize_contender(runs, c);
+    print_row(contenders[c].name, summary);
+    json[contenders[c].name] = to_json(summary);
+  }
+  return json;
+}
 
+nlohmann::json to_json(const FaultScore& score) {
+  return {{"unhealthy_after_s", number_or_null(score.unhealthy_after_s)},
+          {"worst_while_healthy_m", number_or_null(score.worst_while_healthy_m)},
+          {"recovery_s", number_or_null(score.recovery_s)},
+          {"inside_95", number_or_null(score.inside_95)},
+          {"worst_m", number_or_null(score.worst_m)}};
+}
+
+void print_row(const std::string& fault, const std::string& name, const FaultScore& s) {
+  std::cout << std::left << std::setw(20) << fault << std::setw(28) << name << std::right;
+  print_cell(s.unhealthy_after_s, 15, 1, "-");
+  print_cell(s.worst_while_healthy_m, 18, 1);
+  print_cell(s.recovery_s, 12, 1, "never");
+  print_cell(s.inside_95, 11, 2);
+  print_cell(s.worst_m, 9, 1);
+  std::cout << '\n';
+}
+
+/// Prints what every fault did to every contender in one scenario. The same as JSON, with that of each seed.
+nlohmann::json report_faults(const std::vector<Contender>& contenders,
+                             const std::vector<std::vector<FaultResult>>& drives) {
+  std::cout << std::left << std::setw(20) << "fault" << std::setw(28) << "localizer" << std::right
+            << "unhealthy in, s  worst healthy, m  back in, s  inside 95   max, m\n";
+  nlohmann::json json;
+  for (std::size_t f = 0; f < drives.front().size(); ++f) {
+    const std::string& fault = drives.front()[f].fault;
+    for (std::size_t c = 0; c < contenders.size(); ++c) {
+      std::vector<FaultScore> scores;
+      for (const std::vector<FaultResult>& drive : drives) scores.push_back(drive[f].scores[c]);
+      const FaultScore worst = worst_of(scores);
+      print_row(fault, contenders[c].name, worst);
+      nlohmann::json& cell = json[fault][contenders[c].name] = to_json(worst);
+      for (const FaultScore& score : scores) cell["by_seed"].push_back(to_json(score));
+    }
+  }
+  return json;
+}
+
+/// Runs the experiment in all scenarios with all seeds, reports on each scenario, and writes the file of --json.
+template <class Experiment, class Report>
+void run_and_report(const Options& options, const std::string& command, const Experiment& experiment,
+                    const Report& report) {
+  const auto start = std::chrono::steady_clock::now();
+  const auto runs = run_scenarios(options.runs, experiment);
   nlohmann::json metrics;
   metrics["command"] = command;
   metrics["wall_s"] = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   metrics["seeds"] = options.runs.seeds();
   for (std::size_t i = 0; i < runs.size(); ++i) {
     const std::string name = fs::path(options.runs.scenarios[i]).stem().string();
-    std::cout << "\n== " << name << '\n'
-              << std::left << std::setw(28) << "position error, m" << std::right
-              << "     rmse   median      p95      max  heading, deg     NEES  coverage  diverged  back after\n";
-    for (std::size_t c = 0; c < contenders.size(); ++c) {
-      const ContenderSummary summary = summarize_contender(runs[i], c);
-      print_row(contenders[c].name, summary);
-      metrics["scenarios"][name][contenders[c].name] = to_json(summary);
-    }
+    std::cout << "\n== " << name << '\n';
+    metrics["scenarios"][name] = report(runs[i]);
   }
+  if (options.json_file.empty()) return;
+  write_file(options.json_file, [&](std::ostream& out) { out << metrics.dump(2) << '\n'; });
+}
+
+using OnProgress = std::function<void(double)>;
+
+void run_plain(const Options& options, const std::string& command, const std::vector<Contender>& contenders,
+               const LocalizerExperimentConditions& conditions) {
+  const auto experiment = [&](const Scenario& scenario, const OnProgress& on_progress) {
+    return run_localizer_experiment(scenario, contenders, conditions, on_progress);
+  };
+  run_and_report(options, command, experiment, [&](const auto& drives) { return report_errors(contenders, drives); });
   std::cout
       << "\nheading: root mean square; a consistent estimate has a NEES of 3; coverage in %; diverged: drives with "
          "an error beyond "
       << kDiverged_m << " m; back after: s until the error was below " << kGoodFix_m
       << " m again after an outage's first good fix, at worst\n";
-  if (!options.json_file.empty())
-    write_file(options.json_file, [&](std::ostream& out) { out << metrics.dump(2) << '\n'; });
+}
+
+void run_faults(const Options& options, const std::string& command, const std::vector<Contender>& contenders,
+                const LocalizerExperimentConditions& conditions) {
+  const auto experiment = [&](const Scenario& scenario, const OnProgress& on_progress) {
+    return run_fault_experiment(scenario, contenders, conditions, on_progress);
+  };
+  run_and_report(options, command, experiment, [&](const auto& drives) { return report_faults(contenders, drives); });
+  std::cout << "\nThe worst of the seeds, from the fault's onset on. unhealthy in: s from the onset; -: never. worst "
+               "healthy: the largest error with a healthy status. back in: s from the fault's end until the estimate "
+               "was healthy and good (error below "
+            << kGoodFix_m << " m or twice the median without fault) for " << kRecovered_s
+            << " s; -: the fault does not end. inside 95: share of the truth in the 95 % ellipse, mean of the seeds\n";
+}
+
+void run_all(const Options& options, const std::string& command) {
+  const YAML::Node sections = read_sections(options.overrides, standard_localizers());
+  LocalizerExperimentConditions conditions = read_conditions(sections);
+  conditions.fault_onset_s = options.fault_onset_s;
+  (options.faults ? run_faults : run_plain)(options, command, select_contenders(options, sections), conditions);
+}
+
+/// With --faults, what the command line leaves open: every localizer without the occlusion node, on a drive of minutes.
+void choose_fault_runs(CLI::App& app, Options& options) {
+  if (app.count("--localizers") == 0) {
+    options.localizers.clear();
+    for (const LocalizerVariant& variant : standard_localizers().variants()) options.localizers.push_back(variant.name);
+  }
+  if (app.count("--scenarios") == 0) options.runs.scenarios = {"campus_loop"};
+  if (app.count("--seeds") == 0) options.runs.seed_count = 4;
+  if (app.count("--duration") == 0) options.runs.duration_s = 300.0;
 }
 
 }  // namespace
@@ -179,5 +269,12 @@ int main(int argc, char** argv) {
   line.add_set("--set", options.overrides, "after localization., occlusion., gps_bias. or LOCALIZER., a parameter");
   line.add_json(options.json_file);
   line.add_jobs(options.runs.jobs);
-  return line.run(argc, argv, [&] { run_all(options, line.command()); });
+  line.app().add_flag(
+      "--faults", options.faults,
+      "what faults of its inputs do to each localizer; by default without occlusion, 4 seeds, 300 s of campus_loop");
+  line.app().add_option("--fault-onset", options.fault_onset_s, "s after the start")->check(CLI::NonNegativeNumber);
+  return line.run(argc, argv, [&] {
+    if (options.faults) choose_fault_runs(line.app(), options);
+    run_all(options, line.command());
+  });
 }

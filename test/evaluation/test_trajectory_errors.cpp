@@ -240,6 +240,13 @@ TEST(TrajectoryErrors, NeesOfAKnownGaussianIsWithinItsBand) {
   EXPECT_LT(gaussian_errors(kCount, 1.1).summary.nees_mean, 3.0 - band) << "10 % too humble must show";
 }
 
+TEST(TrajectoryErrors, PositionNeesHasTwoDegreesOfFreedom) {
+  constexpr int kCount = 4000;
+  double sum = 0.0;
+  for (const auto& sample : gaussian_errors(kCount, 1.0).samples) sum += sample.position_nees;
+  EXPECT_NEAR(sum / kCount, 2.0, 3.29 * std::sqrt(4.0 / kCount));  // variance 4; with probability 0.999
+}
+
 TEST(FixErrors, AreTakenAtTheFixesOwnStamps) {
   // Neighbouring fixes err to opposite sides: interpolated, they would seem better than they are.
   Trajectory fixes;

@@ -46,6 +46,19 @@ class LocalizerExperimentTest(unittest.TestCase):
                     errors.append(json.load(stream)["scenarios"]["open_sky"]["ukf"]["rmse_m"])
             self.assertNotEqual(*errors)
 
+    def test_faults(self):
+        with tempfile.TemporaryDirectory() as directory:
+            file = os.path.join(directory, "faults.json")
+            done = self.run_tool("--faults", "--scenarios", "open_sky", "--localizers", "ukf", "--seeds", "1",
+                                 "--duration", "45", "--fault-onset", "30", "--json", file)
+            self.assertEqual(done.returncode, 0, done.stdout)
+            with open(file) as stream:
+                faults = json.load(stream)["scenarios"]["open_sky"]
+        self.assertRegex(done.stdout, r"(?m)^dead_encoder +ukf ")
+        self.assertLess(faults["none"]["ukf"]["worst_m"], 5.0)
+        self.assertGreater(faults["pose_30m_off"]["ukf"]["worst_m"], 25.0)
+        self.assertEqual(len(faults["pose_30m_off"]["ukf"]["by_seed"]), 1)
+
     def test_refuses(self):
         for arguments, text in ((("--localizers", "kalman"), "kalman"), (("--set", "ukf.student_dov=1"), "student_dov"),
                                 (("--set", "kalman.gain=1"), "SECTION"), (("--set", "gain=1"), "SECTION"),

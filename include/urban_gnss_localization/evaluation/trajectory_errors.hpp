@@ -23,6 +23,7 @@ struct ErrorSample {
   /// Normalised estimation error squared of x, y, yaw (3 degrees of freedom); NaN where the covariance is not positive
   /// definite.
   double nees{std::numeric_limits<double>::quiet_NaN()};
+  double position_nees{std::numeric_limits<double>::quiet_NaN()};  ///< the same of x, y (2 degrees of freedom)
 };
 
 /// Error samples in a few numbers; NaN where there is nothing to average.

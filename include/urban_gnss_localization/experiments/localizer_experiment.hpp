@@ -7,8 +7,9 @@
 #include <vector>
 
 #include "urban_gnss_localization/evaluation/trajectory_errors.hpp"
-#include "urban_gnss_localization/localizers/nishida/bias_kalman_filter.hpp"
+#include "urban_gnss_localization/experiments/input_faults.hpp"
 #include "urban_gnss_localization/localizers/localizer.hpp"
+#include "urban_gnss_localization/localizers/nishida/bias_kalman_filter.hpp"
 #include "urban_gnss_localization/pipeline/localization_pipeline.hpp"
 #include "urban_gnss_localization/pipeline/occlusion_pipeline.hpp"
 #include "urban_gnss_localization/simulation/scenario.hpp"
@@ -20,6 +21,7 @@ struct Contender {
   std::string name;
   std::function<std::unique_ptr<Localizer>()> make;
   bool uses_occlusion{false};  ///< its fixes have the covariance of the occlusion node, not the receiver's
+  InputFault fault{};          ///< of what it is told
 };
 
 /// What all contenders share, the scenario aside.
@@ -28,6 +30,13 @@ struct LocalizerExperimentConditions {
   LocalizationParameters localization;    ///< datum and antenna are replaced by the scenario's
   GpsBiasParameters bias;                 ///< for those who want the bias's radius
   int cloud_every{5};                     ///< of a spinning lidar's scans, one in so many goes into the maps
+  double fault_onset_s{60.0};             ///< of the contenders' faults, after the start of the drive
+};
+
+/// What a localizer said of itself at a stamp (LocalizationStatus.msg).
+struct HealthSample {
+  Stamp stamp{0};
+  bool healthy{false};
 };
 
 /// A time without fixes, and when the first good fix came after it.
@@ -48,6 +57,8 @@ struct LocalizerRun {
   Trajectory truth;
   std::vector<Trajectory> estimates;  ///< in the order of the contenders
   std::vector<FixOutage> outages;
+  std::vector<std::vector<HealthSample>> health;   ///< every 0.1 s, in the order of the contenders
+  std::vector<std::optional<Stamp>> fault_begins;  ///< in the same order; nothing: it waited for a turn
 };
 
 /// Drives the scenario, each contender behind a pipeline of its own. Nothing but the results sees the truth: they start
