@@ -24,6 +24,9 @@ nlohmann::json to_json(const ErrorSummary& summary) {
           {"position_m", to_json(summary.position_m)},
           {"heading_rad", to_json(summary.heading_rad)},
           {"nees_mean", number_or_null(summary.nees_mean)},
+          {"position_nees_mean", number_or_null(summary.position_nees_mean)},
+          {"inside_95", number_or_null(summary.inside_95)},
+          {"beyond_protection", number_or_null(summary.beyond_protection)},
           {"share_below_5m", number_or_null(summary.share_below_5m)},
           {"share_below_10m", number_or_null(summary.share_below_10m)}};
 }

@@ -7,10 +7,13 @@
 #include <iterator>
 
 #include "urban_gnss_localization/geometry/angles.hpp"
+#include "urban_gnss_localization/geometry/protection_level.hpp"
 
 namespace urban_gnss {
 namespace {
 
+/// Quantile, 95 %, of the chi-squared distribution of 2 degrees of freedom.
+constexpr double kWithin95 = 5.991464547107979;
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 double position_sigma(const Eigen::Matrix3d& covariance) {
@@ -50,10 +53,17 @@ ErrorSummary summarize_errors(const std::vector<ErrorSample>& samples, double co
   std::vector<double> distances;
   std::vector<double> headings;
   std::vector<double> nees;
+  std::vector<double> position_nees;
+  std::size_t inside = 0;
+  std::size_t beyond = 0;
   for (const ErrorSample& sample : samples) {
     distances.push_back(sample.position_error_m);
     if (std::isfinite(sample.heading_error_rad)) headings.push_back(std::abs(sample.heading_error_rad));
     if (std::isfinite(sample.nees)) nees.push_back(sample.nees);
+    if (!std::isfinite(sample.position_nees)) continue;
+    position_nees.push_back(sample.position_nees);
+    if (sample.position_nees < kWithin95) ++inside;
+    if (sample.position_error_m > protection_level_m(sample.position_sigma_m)) ++beyond;
   }
   const auto share_below = [&](double limit_m) {
     const auto below = std::count_if(distances.begin(), distances.end(), [&](double d) { return d < limit_m; });
@@ -64,6 +74,9 @@ ErrorSummary summarize_errors(const std::vector<ErrorSample>& samples, double co
   summary.coverage = coverage;
   summary.share_below_5m = share_below(5.0);
   summary.share_below_10m = share_below(10.0);
+  summary.inside_95 = share(inside, position_nees.size());
+  summary.beyond_protection = share(beyond, position_nees.size());
+  summary.position_nees_mean = summarize(std::move(position_nees)).mean;
   summary.nees_mean = summarize(std::move(nees)).mean;
   summary.heading_rad = summarize(std::move(headings));
   summary.position_m = summarize(std::move(distances));

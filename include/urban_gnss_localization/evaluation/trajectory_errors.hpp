@@ -34,8 +34,11 @@ struct ErrorSummary {
   Summary position_m;
   Summary heading_rad;  ///< of the error's magnitude
   double nees_mean{std::numeric_limits<double>::quiet_NaN()};
-  double share_below_5m{std::numeric_limits<double>::quiet_NaN()};   ///< share (0 to 1) of the samples
-  double share_below_10m{std::numeric_limits<double>::quiet_NaN()};  ///< share (0 to 1) of the samples
+  double position_nees_mean{std::numeric_limits<double>::quiet_NaN()};  ///< 2 where the covariance is right
+  double inside_95{std::numeric_limits<double>::quiet_NaN()};  ///< share (0 to 1) of the truth within the 95 % ellipse
+  double beyond_protection{std::numeric_limits<double>::quiet_NaN()};  ///< share (0 to 1) beyond protection_level_m()
+  double share_below_5m{std::numeric_limits<double>::quiet_NaN()};     ///< share (0 to 1) of the samples
+  double share_below_10m{std::numeric_limits<double>::quiet_NaN()};    ///< share (0 to 1) of the samples
 };
 
 struct TrajectoryErrors {
