@@ -26,9 +26,10 @@ std::optional<MatchedVelocity> match_velocity(const RawVelocity& velocity, const
   const Pose2 turn{0.0, 0.0, then->yaw};
   const Pose2 turn_since{0.0, 0.0, then->yaw - history.pose_at(history.latest())->yaw};
   MatchedVelocity matched;
-  matched.pair = {velocity.stamp, transform_point(turn, in_base), velocity.velocity, velocity.covariance};
+  matched.pair = {velocity.stamp, transform_point(turn, in_base), then->yaw, velocity.velocity, velocity.covariance};
   matched.measurement.velocity = velocity.velocity;
   matched.measurement.covariance = velocity.covariance;
+  matched.measurement.time_s = to_seconds(velocity.stamp);
   matched.measurement.antenna_velocity_in_body = transform_point(turn_since, in_base);
   return matched;
 }

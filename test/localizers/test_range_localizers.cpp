@@ -123,7 +123,7 @@ TEST_P(RangeLocalizers, WithoutResidualsAreAsWithoutSatellites) {
   EXPECT_TRUE(last_of(sky, "use_ranges: false") == expected);
 }
 
-TEST_P(RangeLocalizers, EveryRangeParameterHasAnEffectF36) {
+TEST_P(RangeLocalizers, EveryRangeParameterHasAnEffect) {
   const std::vector<std::pair<std::string, std::string>> changes = {
       {"use_ranges: false", "{}"},
       {"range_sigma: 3.0", "{}"},
@@ -137,7 +137,6 @@ TEST_P(RangeLocalizers, EveryRangeParameterHasAnEffectF36) {
       {"nlos_cn0_rise: 3.0", "{}"},
       {"nlos_elevation_law: cotangent", "{}"},
       {"range_height_sigma: 5.0", "{}"},
-      {"range_correlation_time: 1.0", "{}"},
       {"range_bias_odds: 1.0", "{}"},
   };
   EXPECT_EQ(changes.size(), parameter_names(RangeFixParameters{}).size());

@@ -72,8 +72,8 @@ TEST(DeadReckoning, LinearisesTheMotionModel) {
     EXPECT_TRUE(has_moments(x, 0.0, step.noise(0, 0)));
     EXPECT_TRUE(has_moments(y, 0.0, step.noise(1, 1)));
     EXPECT_TRUE(has_moments(yaw, 0.0, step.noise(2, 2)));
-    EXPECT_EQ(step.noise(3, 3), 0.1 * parameters.speed_scale_walk * parameters.speed_scale_walk);
-    EXPECT_EQ(step.noise(4, 4), 0.1 * parameters.yaw_rate_bias_walk * parameters.yaw_rate_bias_walk);
+    EXPECT_DOUBLE_EQ(step.noise(3, 3), 0.1 * parameters.speed_scale_walk * parameters.speed_scale_walk);
+    EXPECT_DOUBLE_EQ(step.noise(4, 4), 0.1 * parameters.yaw_rate_bias_walk * parameters.yaw_rate_bias_walk);
   }
 }
 

@@ -210,7 +210,7 @@ TEST(RouteFollower, LoopParksOnEveryLap) {
   EXPECT_EQ(follower.laps(), 3);
 }
 
-TEST(RouteFollower, EveryParameterHasAnEffectF36) {
+TEST(RouteFollower, EveryParameterHasAnEffect) {
   const auto lap_time = [](const RouteFollowerParameters& parameters) {
     RouteFollower follower(grid(false), parameters);
     return drive(grid(false), follower, 400.0).time_s;

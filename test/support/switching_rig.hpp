@@ -14,8 +14,9 @@ namespace urban_gnss {
 /// The filters for what the tests simulate: fixes whose errors are white, Gaussian and of the declared size but for a
 /// bias that walks, and odometry without a noise of its own while it moves.
 const char* const kTextbookNoise =
-    "{fix_scale_rate: 0.0, fix_covariance_weight: 1.0, fix_correlation_time: 0.0, parked_correlation_time: 0.0, "
-    "student_dof: 1.0e+9, "
+    "{fix_scale_rate: 0.0, fix_covariance_weight: 1.0, correlation_time: 0.0, correlation_distance: 0.0, "
+    "wander_share: 0.0, student_dof: 1.0e+9, velocity_correlation_time: 0.0, "
+    "common_error_share: 0.0, range_common_error_share: 0.0, common_error_min: 0.0, "
     "bias_fade_time: 0.0, position_walk: 0.0, heading_walk: 0.0, motion_noise_factor: 0.1, speed_scale_sigma: 0.03, "
     "yaw_rate_bias_walk: 3.0e-5, direct_time: 60.0, slow_bias_time: 20.0, fast_bias_time: 1.0, bias_end_time: 60.0, "
     "jump_share: 0.9, slow_bias_walk: 0.2, fast_bias_walk: 1.0, jump_sigma: 20.0, onset_sigma: 0.5, "
@@ -51,11 +52,17 @@ inline std::vector<ParameterChange> switching_model_changes() {
       {"bias_fade_time: 5.0", "{}"},
       {"student_dof: 2.0", "{}"},
       {"fix_scale_rate: 0.1", "{}"},
-      {"fix_correlation_time: 2.0", "{}"},
+      {"correlation_time: 2.0", "{}"},
+      {"correlation_distance: 5.0", "{}"},
       {"fix_scale_limit: 1.05", "fix_scale_rate: 0.1"},
       {"fix_scale_lag: 0.0", "fix_scale_rate: 0.1"},
+      {"fix_scale_distance: 5.0", "fix_scale_rate: 0.1"},
       {"first_fix_scale: 3.0", "fix_scale_rate: 0.1"},
       {"yaw_rate_scale_sigma: 0.02", "{}"},
+      {"wander_share: 0.5", "heading_walk: 0.002"},
+      {"wander_factor: 3.0", "{wander_share: 0.5, heading_walk: 0.002}"},
+      {"quality_time: 5.0", "{wander_share: 0.5, heading_walk: 0.002}"},
+      {"quality_evidence: 1.0", "{wander_share: 0.5, heading_walk: 0.002}"},
   };
 }
 

@@ -13,7 +13,7 @@ namespace {
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 ImmEkfParameters textbook(const std::string& changes = "{}") {
-  const ImmEkfParameters plain = with(ImmEkfParameters{}, "{yaw_rate_scale_sigma: 0.0, common_error_sigma: 0.0}");
+  const ImmEkfParameters plain = with(ImmEkfParameters{}, "yaw_rate_scale_sigma: 0.0");
   return with(with(plain, kTextbookNoise), changes);
 }
 ImmEkf make(const std::string& changes = "{}") { return ImmEkf(textbook(changes), {}); }
@@ -172,7 +172,7 @@ TEST(ImmEkf, LearnsAYawRateThatIsWrongByAFactor) {
 }
 
 TEST(ImmEkf, ErrorThatAllFixesShareIsInTheCovarianceAlone) {
-  ImmEkf with_it = make("common_error_sigma: 0.7");
+  ImmEkf with_it = make("common_error_min: 0.7");
   ImmEkf without = make();
   const auto a = drive(with_it, {});
   const auto b = drive(without, {});
@@ -286,9 +286,9 @@ TEST(ImmEkf, LeverArmIsInTheAntennasPlace) {
 
 TEST(ImmEkf, EveryParameterHasAnEffect) {
   const std::vector<ParameterChange> changes = switching_model_changes();
-  // Elsewhere: those of a parked robot, common_error_sigma, fix_covariance_weight, the velocity's and the ranges'.
-  EXPECT_EQ(changes.size() + 4 + parameter_names(VelocityNoiseParameters{}).size() +
-                parameter_names(RangeFixParameters{}).size(),
+  // Elsewhere: parked_walk, fix_covariance_weight, the common error's, the velocity's and the ranges'.
+  EXPECT_EQ(changes.size() + 2 + parameter_names(CommonErrorParameters{}).size() +
+                parameter_names(VelocityNoiseParameters{}).size() + parameter_names(RangeFixParameters{}).size(),
             parameter_names(ImmEkfParameters{}).size());
   SwitchingDrive d;
   d.bias = bias_between(20.0, 40.0, {4.0, 3.0});
@@ -309,7 +309,7 @@ TEST(ImmEkf, EveryParameterHasAnEffect) {
   }
   EXPECT_LT(parked.health().position_spread_m, drifting.health().position_spread_m);
   // A parked robot's fixes share their error: the second says less.
-  ImmEkf doubting = make("parked_correlation_time: 30.0");
+  ImmEkf doubting = make("correlation_time: 30.0");
   for (ImmEkf* imm : {&doubting, &drifting}) {
     imm->initialize(pose_with_sigma({}, 1.0, 0.1));
     for (double time_s : {1.0, 2.0}) {

@@ -13,7 +13,7 @@ namespace urban_gnss {
 namespace {
 
 ImmEkf make(const std::string& changes = "{}") {
-  const ImmEkfParameters plain = with(ImmEkfParameters{}, "{yaw_rate_scale_sigma: 0.0, common_error_sigma: 0.0}");
+  const ImmEkfParameters plain = with(ImmEkfParameters{}, "yaw_rate_scale_sigma: 0.0");
   return ImmEkf(with(with(plain, kTextbookNoise), changes), {});
 }
 
@@ -157,11 +157,11 @@ TEST(ImmEkfVelocity, EveryParameterHasAnEffect) {
     return imm.pose().yaw;
   };
   const double base = heading("{}");
-  for (const char* change :
-       {"velocity_scale_rate: 0.1", "velocity_scale_limit: 1.01", "velocity_dof: 5.0", "first_velocity_scale: 1.0"}) {
+  for (const char* change : {"velocity_scale_rate: 0.1", "velocity_scale_limit: 1.01", "velocity_dof: 5.0",
+                             "first_velocity_scale: 1.0", "velocity_correlation_time: 2.0"}) {
     EXPECT_NE(heading(change), base) << change;
   }
-  EXPECT_EQ(parameter_names(VelocityNoiseParameters{}).size(), 4u);
+  EXPECT_EQ(parameter_names(VelocityNoiseParameters{}).size(), 5u);
 }
 
 }  // namespace

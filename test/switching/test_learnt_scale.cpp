@@ -3,8 +3,8 @@
 #include <cmath>
 
 #include "urban_gnss_localization/common/random.hpp"
-#include "urban_gnss_localization/localizers/switching/learnt_scale.hpp"
 #include "urban_gnss_localization/gnss/chi_squared.hpp"
+#include "urban_gnss_localization/localizers/switching/learnt_scale.hpp"
 
 namespace urban_gnss {
 namespace {

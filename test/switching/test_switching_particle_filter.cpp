@@ -14,9 +14,7 @@ namespace {
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 SwitchingParticleFilterParameters switching(const std::string& changes = "{}") {
-  return with(with(with(SwitchingParticleFilterParameters{}, "{yaw_rate_scale_sigma: 0.0, common_error_sigma: 0.0}"),
-                   kTextbookNoise),
-              changes);
+  return with(with(with(SwitchingParticleFilterParameters{}, "yaw_rate_scale_sigma: 0.0"), kTextbookNoise), changes);
 }
 SwitchingParticleFilter make(const std::string& changes = "{}") { return {switching(changes), {}}; }
 
@@ -66,7 +64,8 @@ TEST(SwitchingParticleFilter, FirstFixIsTheInteractingModels) {
 /// Where all particles of a mode are merged, what is left is imm_ekf, the plain reference of one step and of all.
 TEST(SwitchingParticleFilter, MergedParticlesAreTheInteractingModels) {
   for (const char* changes :
-       {"{}", "{student_dof: 2.0, bias_fade_time: 5.0, fix_scale_rate: 0.05, fix_correlation_time: 2.0}"}) {
+       {"{}",
+        "{student_dof: 2.0, bias_fade_time: 5.0, fix_scale_rate: 0.05, correlation_time: 2.0, wander_share: 0.4}"}) {
     SwitchingDrive d;
     d.bias = bias_between(40.0, 80.0, {15.0, -8.0});
     SwitchingParticleFilter particles(with(switching(changes), "merge_distance: 1.0e+12"), {});
@@ -84,7 +83,7 @@ TEST(SwitchingParticleFilter, MergedParticlesAreTheInteractingModels) {
 TEST(SwitchingParticleFilter, VelocityCorrectsAndWeighsHeadings) {
   SwitchingParticleFilter filter = make();
   filter.initialize(pose_with_sigma({}, 1.0, kPi));
-  EXPECT_EQ(filter.hypotheses().size(), 100u);
+  EXPECT_EQ(filter.hypotheses().size(), 99u);  // 33 headings, at each quality of the odometry
   EXPECT_GT(filter.health().heading_sigma_rad, 2.0);
   VelocityMeasurement velocity;
   velocity.antenna_velocity_in_body = {5.0, 0.0};
@@ -108,7 +107,7 @@ TEST(SwitchingParticleFilter, NumberOfParticlesAdaptsItself) {
   EXPECT_EQ(filter.health().particle_count, filter.hypotheses().size());
   EXPECT_EQ(filter.particles().size(), filter.hypotheses().size());
   filter.initialize(pose_with_sigma({}, 1.0, kPi));
-  EXPECT_EQ(filter.health().particle_count, 100u);
+  EXPECT_EQ(filter.health().particle_count, 99u);
 }
 
 /// The slices together are the Gaussian that was given.
@@ -284,12 +283,14 @@ TEST(SwitchingParticleFilter, EveryParameterHasAnEffect) {
                                     {"velocity_scale_limit: 1.05", "{}"},
                                     {"first_velocity_scale: 1.0", "{}"},
                                     {"velocity_dof: 5.0", "{}"},
+                                    {"velocity_correlation_time: 2.0", "{}"},
                                     {"estimate: mean", kOftenBiased},
                                     {"cluster_cell: 20.0", kOftenBiased},
                                 });
   // Those of a parked robot, of changing declarations, and of the covariance alone; elsewhere,
   // those of ranges.
-  EXPECT_EQ(changes.size() + 4 + parameter_names(RangeFixParameters{}).size(),
+  EXPECT_EQ(changes.size() + 2 + parameter_names(CommonErrorParameters{}).size() +
+                parameter_names(RangeFixParameters{}).size(),
             parameter_names(SwitchingParticleFilterParameters{}).size());
   SwitchingDrive d;
   d.bias = bias_between(10.0, 20.0, {4.0, 3.0});

@@ -20,8 +20,8 @@ EnumNames<NlosElevationLaw> enum_names(NlosElevationLaw);
 
 /// Excess range of an NLOS signal, and what its C/N0 says of whether it is one.
 struct NlosParameters {
-  double mean{18.0};
-  double sigma{15.0};
+  double mean{22.0};
+  double sigma{40.0};
   NlosElevationLaw elevation_law{NlosElevationLaw::kCosecant};
   double elevation_exponent{0.7};
   double cn0_width{2.5};

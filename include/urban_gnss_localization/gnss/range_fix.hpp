@@ -21,7 +21,6 @@ struct RangeFixParameters {
   NlosParameters nlos;
   double nlos_cn0_drop{14.0};
   double range_height_sigma{30.0};
-  double range_correlation_time{6.0};
   double range_bias_odds{0.03};
 
   void visit(ParameterVisitor& v) {
@@ -38,8 +37,6 @@ struct RangeFixParameters {
     v("nlos_cn0_drop", nlos_cn0_drop, between(0.0, 50.0), "dB",
       "drop of C/N0 below its nominal value at which a signal is as likely NLOS as in line of sight");
     v("range_height_sigma", range_height_sigma, positive(), "m", "standard deviation of the receiver's own height");
-    v("range_correlation_time", range_correlation_time, non_negative(), "s",
-      "correlation time of the errors of ranges; 0: independent errors");
     v("range_bias_odds", range_bias_odds, positive(), "",
       "factor on the odds of a bias in a fix whose ranges are known");
   }

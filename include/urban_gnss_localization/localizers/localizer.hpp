@@ -32,6 +32,7 @@ struct VelocityMeasurement {
   Eigen::Matrix2d covariance{Eigen::Matrix2d::Identity()};  ///< (m/s)^2
   /// By the odometry at the velocity's stamp (m/s), seen from the base as it stands now.
   Eigen::Vector2d antenna_velocity_in_body{Eigen::Vector2d::Zero()};
+  double time_s{0.0};  ///< of the velocity, since any fixed instant
 };
 
 /// Whether a filter can take the fix: all finite, with a positive definite covariance.

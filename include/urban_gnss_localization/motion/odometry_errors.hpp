@@ -9,11 +9,11 @@ namespace urban_gnss {
 /// do not estimate them.
 struct OdometryErrorParameters {
   double motion_noise_factor{0.003};
-  double speed_scale_sigma{0.02};
-  double speed_scale_walk{2e-4};
+  double speed_scale_sigma{0.1};
+  double speed_scale_walk{5e-4};
   double yaw_rate_bias_sigma{0.005};
   double yaw_rate_bias_walk{1e-5};
-  double position_walk{0.1};
+  double position_walk{0.12};
   double heading_walk{0.002};
   double parked_walk{0.03};
   double standstill_radps{kStandstill_radps};  ///< not told by users: the yaw rate at which the method's robot stands

@@ -114,7 +114,7 @@ BiasEkfUpdate take_fix(BiasGaussian& state, BiasMode mode, const FixMeasurement&
 }
 
 BiasEkfUpdate take_velocity(BiasGaussian& state, const VelocityMeasurement& measured, const Eigen::Matrix2d& noise,
-                            double dof) {
+                            double inflation, double dof) {
   const Eigen::Vector2d along = transform_point({0.0, 0.0, state.mean[kYaw]}, measured.antenna_velocity_in_body);
   const Eigen::Vector2d predicted = (1.0 + state.mean[kSpeedScale]) * along;
   Sensitivity h = Sensitivity::Zero();
@@ -123,11 +123,12 @@ BiasEkfUpdate take_velocity(BiasGaussian& state, const VelocityMeasurement& meas
   const Eigen::Vector2d innovation = measured.velocity - predicted;
   const Gain with_velocity = state.covariance * h.transpose();
   const Eigen::Matrix2d hph = h * with_velocity;
-  const Eigen::Matrix2d plain = hph + noise;
+  const Eigen::Matrix2d plain = hph + inflation * noise;
   BiasEkfUpdate update;
-  update.nis = update.white_nis = innovation.dot(plain.inverse() * innovation);
-  const double weight = std::min(1.0, (dof + kVelocityDof) / (dof + update.nis));
-  const Eigen::Matrix2d s = hph + noise / weight;
+  update.white_nis = innovation.dot((hph + noise).inverse() * innovation);
+  update.nis = innovation.dot(plain.inverse() * innovation);
+  const double weight = std::min(1.0, (dof + kVelocityDof) / (dof + update.white_nis));
+  const Eigen::Matrix2d s = hph + inflation / weight * noise;
   const Gain gain = with_velocity * s.inverse();
   state.mean += gain * innovation;
   state.mean[kYaw] = wrap_angle(state.mean[kYaw]);

@@ -11,6 +11,8 @@ namespace {
 
 /// Weight of a fix in the mean of what fixes declare.
 constexpr double kMeanRate = 0.03;
+/// Between fixes that are remembered.
+constexpr double kLeastWay_m = 1.0;
 /// ln of the most by which a declared variance is changed: one that says "worth nothing" is still worth next to
 /// nothing.
 const double kMostTempered = std::log(4.0);
@@ -40,9 +42,7 @@ Eigen::Matrix2d FixNoiseModel::effective_covariance(const Eigen::Matrix2d& decla
 }
 
 double FixNoiseModel::correlation_inflation(double time_s) const {
-  const double correlation_s =
-      since_fix_.is_standstill() ? parameters_.parked_correlation_time : parameters_.fix_correlation_time;
-  return last_s_ ? markov_inflation(time_s - *last_s_, correlation_s) : 1.0;
+  return last_s_ ? parameters_.errors.inflation(since_fix_.distance_m, time_s - *last_s_) : 1.0;
 }
 
 void FixNoiseModel::learn(double time_s, double exceeding) {
@@ -52,24 +52,25 @@ void FixNoiseModel::learn(double time_s, double exceeding) {
 }
 
 void FixNoiseModel::compare(const DeadReckonedFix& fix) {
-  if (lag_s_ <= 0.0) return;
-  while (fixes_.size() > 1 && fix.time_s - fixes_[1].time_s >= lag_s_) fixes_.pop_front();
-  if (!fixes_.empty()) {
+  if (parameters_.fix_scale_lag <= 0.0) return;
+  const auto is_apart = [&](const DeadReckonedFix& before) {
+    return fix.time_s - before.time_s >= parameters_.fix_scale_lag &&
+           fix.way_m - before.way_m >= parameters_.fix_scale_distance;
+  };
+  while (fixes_.size() > 1 && is_apart(fixes_[1])) fixes_.pop_front();
+  if (!fixes_.empty() && is_apart(fixes_.front())) {
     const DeadReckonedFix& before = fixes_.front();
-    const double apart = fix.time_s - before.time_s;
-    if (apart >= lag_s_ && apart < 2.0 * lag_s_) {
-      if (!lagged_scale_) lagged_scale_ = scale_;
-      const double turned =
-          (fix.place - before.place).norm() * std::max(fix.heading_sigma_rad, before.heading_sigma_rad);
-      const Eigen::Matrix2d covariance =
-          lagged_scale_->value() * (fix.covariance + before.covariance) +
-          (std::max(fix.walk_m2 - before.walk_m2, 0.0) + turned * turned) * Eigen::Matrix2d::Identity();
-      const Eigen::Vector2d difference = fix.misfit - before.misfit;
-      const double nis = difference.dot(covariance.inverse() * difference);
-      lagged_scale_->learn(nis > LearntScale::kMedianNis ? 1.0 : 0.0);
-    }
+    if (!lagged_scale_) lagged_scale_ = scale_;
+    const double turned = (fix.place - before.place).norm() * std::max(fix.heading_sigma_rad, before.heading_sigma_rad);
+    const Eigen::Matrix2d noise = lagged_scale_->value() * (fix.covariance + before.covariance);
+    const double odometry_m2 = std::max(fix.walk_m2 - before.walk_m2, 0.0) + turned * turned;
+    const Eigen::Matrix2d covariance = noise + odometry_m2 * Eigen::Matrix2d::Identity();
+    const Eigen::Vector2d difference = fix.misfit - before.misfit;
+    const double nis = difference.dot(covariance.inverse() * difference);
+    lagged_scale_->learn(nis > LearntScale::kMedianNis ? 1.0 : 0.0, noise.trace() / covariance.trace());
   }
-  fixes_.push_back(fix);
+  // Who stands adds nothing: the fixes that are remembered do not grow in number.
+  if (fixes_.empty() || fix.way_m - fixes_.back().way_m >= kLeastWay_m) fixes_.push_back(fix);
 }
 
 }  // namespace urban_gnss

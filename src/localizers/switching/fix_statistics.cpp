@@ -13,7 +13,6 @@ constexpr int kYaw = 2;
 /// square of middle_range_sigma_m().
 FixNoiseModelParameters range_noise(const SwitchingModelParameters& p) {
   FixNoiseModelParameters noise = p.noise;
-  noise.fix_correlation_time = p.ranges.range_correlation_time;
   const double middle_m = p.ranges.middle_range_sigma_m();
   noise.fix_scale_limit = p.ranges.range_sigma_max / middle_m;
   noise.first_fix_scale = std::pow(p.ranges.range_sigma / middle_m, 2);
@@ -24,7 +23,7 @@ FixNoiseModelParameters range_noise(const SwitchingModelParameters& p) {
 
 FixStatistics::FixStatistics(const SwitchingModelParameters& parameters)
     : parameters_(parameters),
-      noise_(parameters.noise, parameters.fix_scale_lag),
+      noise_(parameters.noise),
       range_noise_(range_noise(parameters)),
       velocity_scale_(parameters.velocity.fresh_scale()) {}
 
@@ -35,13 +34,16 @@ void FixStatistics::reset() {
   of_ranges_ = false;
   velocity_scale_ = parameters_.velocity.fresh_scale();
   last_fix_s_.reset();
+  last_velocity_s_.reset();
   moved_s_ = 0.0;
+  way_m_ = 0.0;
   corrections_.setZero();
   common_variance_m2_ = 0.0;
 }
 
 void FixStatistics::move(const Twist2& twist, double duration_s) {
   moved_s_ += duration_s;
+  way_m_ += std::abs(twist.speed_mps) * duration_s;
   noise_.move(twist, duration_s);
   range_noise_.move(twist, duration_s);
 }
@@ -77,8 +79,10 @@ FixMeasurement FixStatistics::effective_fix(const FixMeasurement& fix, const Bia
   return effective;
 }
 
-void FixStatistics::learn_velocity(double exceeding, const BiasGaussian& before, const BiasGaussian& after) {
+void FixStatistics::learn_velocity(double time_s, double exceeding, const BiasGaussian& before,
+                                   const BiasGaussian& after) {
   velocity_scale_.learn(exceeding);
+  last_velocity_s_ = time_s;
   corrections_ += after.mean.head<2>() - before.mean.head<2>();
 }
 
@@ -89,18 +93,21 @@ void FixStatistics::learn_fix(double time_s, double exceeding) {
 
 void FixStatistics::compare_with_odometry(const FixMeasurement& fix, const BiasGaussian& before,
                                           const BiasGaussian& after) {
+  FixNoiseModel& noise = of_ranges_ ? range_noise_ : noise_;
   const double walk = parameters_.odometry.position_walk;
   DeadReckonedFix beside;
   beside.place = transform_point(before.pose(), fix.antenna_in_body) - corrections_;
   beside.misfit = fix.position - beside.place;
-  beside.covariance = parameters_.fix.direct_covariance(fix.covariance);
+  beside.covariance =
+      of_ranges_ ? Eigen::Matrix2d(fix.covariance / noise.scale()) : parameters_.fix.direct_covariance(fix.covariance);
   beside.walk_m2 = walk * walk * moved_s_;
   beside.heading_sigma_rad = std::sqrt(before.covariance(kYaw, kYaw));
   beside.time_s = fix.time_s;
-  if (!of_ranges_) noise_.compare(beside);
+  beside.way_m = way_m_;
+  noise.compare(beside);
   corrections_ += after.mean.head<2>() - before.mean.head<2>();
-  const double common = parameters_.common_error_sigma;
-  common_variance_m2_ = std::min(common * common, 0.5 * beside.covariance.trace());
+  const double declared_m2 = 0.5 * beside.covariance.trace();
+  common_variance_m2_ = parameters_.common_error.variance_m2(noise.scale() * declared_m2, declared_m2, of_ranges_);
 }
 
 }  // namespace urban_gnss

@@ -29,7 +29,8 @@ ImmEkf::ImmEkf(const ImmEkfParameters& parameters, const MotionParameters& motio
     : parameters_(parameters),
       motion_(motion),
       nis_threshold_(chi_squared_quantile(kReportedQuantile, kFixDof)),
-      statistics_(parameters) {
+      statistics_(parameters),
+      levels_(quality_levels(parameters.odometry, parameters.quality)) {
   initialize({});
 }
 
@@ -37,46 +38,55 @@ void ImmEkf::initialize(const PoseEstimate& start) {
   if (!is_finite(start.pose)) throw std::invalid_argument("imm_ekf: the pose to start from is not finite");
   if (!start.covariance.allFinite()) throw std::invalid_argument("imm_ekf: the covariance to start from is not finite");
   filters_.fill(start_gaussian(start, parameters_));
-  probability_ << 1.0, 0.0, 0.0;
+  probability_.fill(0.0);
+  for (std::size_t level = 0; level < kQualityLevels; ++level) probability_[level * kLastingModes] = 1.0;
+  set_quality(prior_quality(parameters_.quality));
   statistics_.reset();
 }
 
 void ImmEkf::move(const Twist2& twist, double duration_s) {
   if (!is_usable(twist, duration_s)) return;
   statistics_.move(twist, duration_s);
-  const MotionStep step = make_motion_step(twist, duration_s, motion_, parameters_.odometry);
-  for (Gaussian& filter : filters_) predict(filter, step, parameters_.odometry);
-}
-
-Gaussian ImmEkf::mixed_into(BiasMode to, const ModeTransition& transition, double elapsed_s) const {
-  std::array<Gaussian, kLastingModes> parts = filters_;
-  std::array<double, kLastingModes> weights{};
-  double sum = 0.0;
-  for (std::size_t i = 0; i < kLastingModes; ++i) {
-    weights[i] = probability_[static_cast<int>(i)] * transition(static_cast<int>(i), static_cast<int>(index_of(to)));
-    sum += weights[i];
-    continue_bias(parts[i], kModes[i], to, elapsed_s, parameters_.modes);
+  for (std::size_t i = 0; i < kFilters; ++i) {
+    const OdometryErrorParameters& errors = levels_[i / kLastingModes];
+    predict(filters_[i], make_motion_step(twist, duration_s, motion_, errors), errors);
   }
-  if (!(sum > 0.0)) return parts[0];
-  for (double& weight : weights) weight /= sum;
-  return mixture_of(parts, weights);
 }
 
 ImmEkf::Branches ImmEkf::branch(const FixMeasurement& fix) const {
   const double elapsed_s = statistics_.elapsed_s(fix.time_s);
   const FixNoise noise = statistics_.fix_noise(fix.time_s);
   const ModeTransition transition = mode_transition(elapsed_s, parameters_.modes, statistics_.bias_odds());
-  const Eigen::Vector4d prior = transition.transpose() * probability_;
+  const QualityTransition quality = quality_transition(elapsed_s, parameters_.quality);
   Branches branches;
   double largest = -std::numeric_limits<double>::infinity();
   bool is_finite = true;
   for (std::size_t j = 0; j < kContinuations; ++j) {
-    Gaussian& filter = branches.filters[j];
-    filter = mixed_into(kModes[j], transition, elapsed_s);
-    branches.updates[j] = take_fix(filter, kModes[j], fix, noise, parameters_);
-    is_finite = is_finite && filter.is_finite();
-    branches.probability[j] = std::log(prior[static_cast<int>(j)]) + branches.updates[j].log_likelihood;
-    largest = std::max(largest, branches.probability[j]);
+    std::array<Gaussian, kFilters> parts = filters_;
+    for (std::size_t i = 0; i < kFilters; ++i) {
+      continue_bias(parts[i], kModes[i % kLastingModes], kModes[j], elapsed_s, parameters_.modes);
+    }
+    for (std::size_t level = 0; level < kQualityLevels; ++level) {
+      std::array<double, kFilters> weights{};
+      double sum = 0.0;
+      for (std::size_t i = 0; i < kFilters; ++i) {
+        weights[i] = probability_[i] * transition(static_cast<int>(i % kLastingModes), static_cast<int>(j)) *
+                     quality(static_cast<int>(i / kLastingModes), static_cast<int>(level));
+        sum += weights[i];
+      }
+      const std::size_t branch = level * kContinuations + j;
+      Gaussian& filter = branches.filters[branch];
+      if (sum > 0.0) {
+        for (double& weight : weights) weight /= sum;
+        filter = mixture_of(parts, weights);
+      } else {
+        filter = parts[level * kLastingModes];
+      }
+      branches.updates[branch] = take_fix(filter, kModes[j], fix, noise, parameters_);
+      is_finite = is_finite && filter.is_finite();
+      branches.probability[branch] = std::log(sum) + branches.updates[branch].log_likelihood;
+      largest = std::max(largest, branches.probability[branch]);
+    }
   }
   branches.are_finite = is_finite && std::isfinite(largest);
   double sum = 0.0;
@@ -86,17 +96,23 @@ ImmEkf::Branches ImmEkf::branch(const FixMeasurement& fix) const {
 }
 
 void ImmEkf::merge(const Branches& branches) {
+  constexpr std::size_t kDirect = index_of(BiasMode::kDirect);
   constexpr std::size_t kSlow = index_of(BiasMode::kSlow);
+  constexpr std::size_t kFast = index_of(BiasMode::kFast);
   constexpr std::size_t kJump = index_of(BiasMode::kJump);
-  const auto& p = branches.probability;
-  const double slow = p[kSlow] + p[kJump];
-  filters_[index_of(BiasMode::kDirect)] = branches.filters[index_of(BiasMode::kDirect)];
-  filters_[index_of(BiasMode::kFast)] = branches.filters[index_of(BiasMode::kFast)];
-  if (slow > 0.0) {
-    filters_[kSlow] =
-        mixture_of<2>({branches.filters[kSlow], branches.filters[kJump]}, {p[kSlow] / slow, p[kJump] / slow});
+  for (std::size_t level = 0; level < kQualityLevels; ++level) {
+    const double* p = &branches.probability[level * kContinuations];
+    const Gaussian* filters = &branches.filters[level * kContinuations];
+    Gaussian* merged = &filters_[level * kLastingModes];
+    double* probability = &probability_[level * kLastingModes];
+    const double slow = p[kSlow] + p[kJump];
+    merged[kDirect] = filters[kDirect];
+    merged[kFast] = filters[kFast];
+    if (slow > 0.0) merged[kSlow] = mixture_of<2>({filters[kSlow], filters[kJump]}, {p[kSlow] / slow, p[kJump] / slow});
+    probability[kDirect] = p[kDirect];
+    probability[kSlow] = slow;
+    probability[kFast] = p[kFast];
   }
-  probability_ << p[index_of(BiasMode::kDirect)], slow, p[index_of(BiasMode::kFast)];
 }
 
 FixOutcome ImmEkf::correct(const FixMeasurement& declared) {
@@ -120,15 +136,19 @@ FixOutcome ImmEkf::correct(const FixMeasurement& declared) {
   }
   double any_outlier = 0.0;
   double exceeding = 0.0;
-  for (std::size_t j = 0; j < kContinuations; ++j) {
+  for (std::size_t j = 0; j < kBranches; ++j) {
     any_outlier += branches.probability[j] * branches.updates[j].outlier;
     if (branches.updates[j].white_nis > LearntScale::kMedianNis) exceeding += branches.probability[j];
   }
+  const double elapsed_s = statistics_.elapsed_s(fix.time_s);
   statistics_.learn_fix(fix.time_s, exceeding);
+  const QualityProbabilities expected =
+      quality_transition(elapsed_s, parameters_.quality).transpose() * quality_probabilities();
   merge(branches);
+  set_quality(bounded_quality(expected, quality_probabilities(), parameters_.quality));
   statistics_.compare_with_odometry(fix, before, mixture());
 
-  outcome.decision = probability_[0] >= 0.5 ? FixDecision::kAccepted : FixDecision::kBiasCompensated;
+  outcome.decision = mode_probabilities()[0] >= 0.5 ? FixDecision::kAccepted : FixDecision::kBiasCompensated;
   if (any_outlier > 0.5) {
     outcome.decision = FixDecision::kInflated;
     outcome.reason = "outlier, probability " + std::to_string(any_outlier);
@@ -139,24 +159,58 @@ FixOutcome ImmEkf::correct(const FixMeasurement& declared) {
 void ImmEkf::correct_velocity(const VelocityMeasurement& measured) {
   if (!is_usable(measured)) return;
   const Eigen::Matrix2d noise = statistics_.velocity_scale() * measured.covariance;
-  std::array<Gaussian, kLastingModes> next = filters_;
-  ModeProbabilities log_weight;
+  const double inflation = statistics_.velocity_inflation(measured.time_s);
+  std::array<Gaussian, kFilters> next = filters_;
+  std::array<double, kFilters> weight{};
   double exceeding = 0.0;
-  for (std::size_t i = 0; i < kLastingModes; ++i) {
-    const BiasEkfUpdate update = take_velocity(next[i], measured, noise, parameters_.velocity.velocity_dof);
-    log_weight[static_cast<int>(i)] = update.log_likelihood;
-    if (update.nis > LearntScale::kMedianNis) exceeding += probability_[static_cast<int>(i)];
+  double largest = -std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < kFilters; ++i) {
+    const BiasEkfUpdate update = take_velocity(next[i], measured, noise, inflation, parameters_.velocity.velocity_dof);
+    if (update.white_nis > LearntScale::kMedianNis) exceeding += probability_[i];
     if (!next[i].is_finite()) return;
+    weight[i] = std::log(probability_[i]) + update.log_likelihood;
+    largest = std::max(largest, weight[i]);
   }
+  if (!std::isfinite(largest)) return;
   const Gaussian before = mixture();
+  const QualityProbabilities quality = quality_probabilities();
   filters_ = next;
-  probability_ = probability_.cwiseProduct((log_weight.array() - log_weight.maxCoeff()).exp().matrix());
-  probability_ /= probability_.sum();
-  statistics_.learn_velocity(exceeding, before, mixture());
+  for (std::size_t i = 0; i < kFilters; ++i) probability_[i] = std::exp(weight[i] - largest);
+  set_quality(quality);  // errors of velocities last, and look like a heading that wanders
+  statistics_.learn_velocity(measured.time_s, exceeding, before, mixture());
 }
 
-Gaussian ImmEkf::mixture() const {
-  return mixture_of<kLastingModes>(filters_, {probability_[0], probability_[1], probability_[2]});
+Gaussian ImmEkf::mixture() const { return mixture_of(filters_, probability_); }
+
+Gaussian ImmEkf::given(BiasMode mode) const {
+  std::array<double, kFilters> weights{};
+  double sum = 0.0;
+  for (std::size_t i = 0; i < kFilters; ++i) {
+    if (i % kLastingModes == index_of(lasting(mode))) sum += weights[i] = probability_[i];
+  }
+  if (!(sum > 0.0)) return filters_[index_of(lasting(mode))];
+  for (double& weight : weights) weight /= sum;
+  return mixture_of(filters_, weights);
+}
+
+ModeProbabilities ImmEkf::mode_probabilities() const {
+  ModeProbabilities sums = ModeProbabilities::Zero();
+  for (std::size_t i = 0; i < kFilters; ++i) sums[static_cast<int>(i % kLastingModes)] += probability_[i];
+  return sums;
+}
+
+void ImmEkf::set_quality(const QualityProbabilities& target) {
+  const QualityProbabilities present = quality_probabilities();
+  for (std::size_t i = 0; i < kFilters; ++i) {
+    const auto level = static_cast<int>(i / kLastingModes);
+    if (present[level] > 0.0) probability_[i] *= target[level] / present[level];
+  }
+}
+
+QualityProbabilities ImmEkf::quality_probabilities() const {
+  QualityProbabilities sums = QualityProbabilities::Zero();
+  for (std::size_t i = 0; i < kFilters; ++i) sums[static_cast<int>(i / kLastingModes)] += probability_[i];
+  return sums;
 }
 
 Pose2 ImmEkf::pose() const { return mixture().pose(); }

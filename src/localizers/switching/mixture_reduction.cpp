@@ -62,7 +62,8 @@ void MixtureReducer::merge(std::vector<BiasHypothesis>& hypotheses, double dista
     BiasHypothesis& other = hypotheses[i];
     if (!(other.weight > 0.0)) break;
     const auto same = std::find_if(kept_.begin(), kept_.end(), [&](std::uint32_t k) {
-      return hypotheses[k].mode == other.mode && has_same_heading(hypotheses[k].state, other.state) &&
+      return hypotheses[k].mode == other.mode && hypotheses[k].quality == other.quality &&
+             has_same_heading(hypotheses[k].state, other.state) &&
              marginal_distance(hypotheses[k].state, other.state) < distance;
     });
     if (same == kept_.end()) {

@@ -2,6 +2,7 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
@@ -20,12 +21,11 @@ constexpr BiasMode kModes[kContinuations] = {BiasMode::kDirect, BiasMode::kSlow,
 /// Cuts a start whose heading is too uncertain for a linearisation into up to `most` slices of headings, all over the
 /// circle where it is not known at all.
 void slice_heading(const BiasGaussian& start, std::size_t most, std::vector<BiasHypothesis>& slices) {
-  slices.clear();
   const double variance = start.covariance(kYaw, kYaw);
   const double sigma = std::sqrt(variance);
-  const std::size_t count = sigma > MixtureReducer::kSameHeading ? most : 1;
+  const std::size_t count = sigma > MixtureReducer::kSameHeading ? std::max<std::size_t>(most, 1) : 1;
   if (count == 1) {
-    slices.push_back({start, BiasMode::kDirect, 1.0});
+    slices.push_back({start, BiasMode::kDirect, 0, 1.0});
     return;
   }
   const bool is_unknown = variance >= kPi * kPi / 3.0;
@@ -33,7 +33,7 @@ void slice_heading(const BiasGaussian& start, std::size_t most, std::vector<Bias
   const double width = 2.0 * half_range / static_cast<double>(count);
   const double left = std::min(width * width, variance);  // variance of a slice, which overlaps with those beside it
   const BiasEkfState with_yaw = start.covariance.col(kYaw) / variance;
-  BiasHypothesis slice{start, BiasMode::kDirect, 0.0};
+  BiasHypothesis slice{start, BiasMode::kDirect, 0, 0.0};
   slice.state.covariance -= (variance - left) * with_yaw * with_yaw.transpose();
   double sum = 0.0;
   for (std::size_t k = 0; k < count; ++k) {
@@ -46,23 +46,60 @@ void slice_heading(const BiasGaussian& start, std::size_t most, std::vector<Bias
   for (BiasHypothesis& each : slices) each.weight /= sum;
 }
 
+/// Each hypothesis once for each quality of the odometry.
+void spread_quality(const QualityProbabilities& prior, std::vector<BiasHypothesis>& hypotheses) {
+  const std::size_t count = hypotheses.size();
+  for (std::size_t level = kQualityLevels; level-- > 0;) {
+    for (std::size_t i = 0; i < count; ++i) {
+      BiasHypothesis each = hypotheses[i];
+      each.quality = level;
+      each.weight *= prior[static_cast<int>(level)];
+      if (level > 0) {
+        hypotheses.push_back(each);
+      } else {
+        hypotheses[i] = each;
+      }
+    }
+  }
+}
+
+QualityProbabilities quality_of(const std::vector<BiasHypothesis>& hypotheses) {
+  QualityProbabilities sums = QualityProbabilities::Zero();
+  for (const BiasHypothesis& each : hypotheses) sums[static_cast<int>(each.quality)] += each.weight;
+  return sums;
+}
+
+/// Weighs those of each quality so that they sum to `target`.
+void set_quality(const QualityProbabilities& target, std::vector<BiasHypothesis>& hypotheses) {
+  const QualityProbabilities present = quality_of(hypotheses);
+  double sum = 0.0;
+  for (BiasHypothesis& each : hypotheses) {
+    const auto level = static_cast<int>(each.quality);
+    if (present[level] > 0.0) each.weight *= target[level] / present[level];
+    sum += each.weight;
+  }
+  for (BiasHypothesis& each : hypotheses) each.weight /= sum;  // a quality may have died out
+}
+
 }  // namespace
 
 SwitchingParticleFilter::SwitchingParticleFilter(const SwitchingParticleFilterParameters& parameters,
                                                  const MotionParameters& motion)
-    : ParticleLocalizer(static_cast<std::size_t>(parameters.max_particles) + 1),
+    : ParticleLocalizer(0),
       parameters_(parameters),
       motion_(motion),
       nis_threshold_(chi_squared_quantile(kReportedQuantile, kFixDof)),
       most_(static_cast<std::size_t>(parameters.max_particles)),
       statistics_(parameters.model),
-      reducer_(kContinuations * (most_ + 1)) {
-  hypotheses_.reserve(kContinuations * (most_ + 1));
-  next_.reserve(kContinuations * (most_ + 1));
-  updates_.reserve(kContinuations * (most_ + 1));
-  cluster_.reserve(most_ + 1);
-  cluster_mass_.reserve(most_ + 1);
-  draws_.reserve(most_ + 1);
+      levels_(quality_levels(parameters.model.odometry, parameters.model.quality)),
+      reducer_(kContinuations * kQualityLevels * capacity()) {
+  particles_ = ParticleSet(capacity());
+  hypotheses_.reserve(kContinuations * kQualityLevels * capacity());
+  next_.reserve(kContinuations * kQualityLevels * capacity());
+  updates_.reserve(kContinuations * kQualityLevels * capacity());
+  cluster_.reserve(capacity());
+  cluster_mass_.reserve(capacity());
+  draws_.reserve(capacity());
   initialize({});
 }
 
@@ -71,7 +108,9 @@ void SwitchingParticleFilter::initialize(const PoseEstimate& start) {
     throw std::invalid_argument("switching_particle_filter: the pose to start from is not finite");
   }
   engine_ = make_engine(static_cast<std::uint64_t>(parameters_.seed));
-  slice_heading(start_gaussian(start, parameters_.model), most_, hypotheses_);
+  hypotheses_.clear();
+  slice_heading(start_gaussian(start, parameters_.model), most_ / kQualityLevels, hypotheses_);
+  spread_quality(prior_quality(parameters_.model.quality), hypotheses_);
   statistics_.reset();
   draw_cloud();
   find_clusters();
@@ -80,8 +119,9 @@ void SwitchingParticleFilter::initialize(const PoseEstimate& start) {
 void SwitchingParticleFilter::move(const Twist2& twist, double duration_s) {
   if (!is_usable(twist, duration_s)) return;
   statistics_.move(twist, duration_s);
-  const MotionStep step = make_motion_step(twist, duration_s, motion_, parameters_.model.odometry);
-  for (BiasHypothesis& each : hypotheses_) predict(each.state, step, parameters_.model.odometry);
+  std::array<MotionStep, kQualityLevels> steps;
+  for (std::size_t i = 0; i < kQualityLevels; ++i) steps[i] = make_motion_step(twist, duration_s, motion_, levels_[i]);
+  for (BiasHypothesis& each : hypotheses_) predict(each.state, steps[each.quality], levels_[each.quality]);
   update_estimate();
 }
 
@@ -89,15 +129,21 @@ bool SwitchingParticleFilter::continue_all(const FixMeasurement& fix, Opinion& o
   const double elapsed_s = statistics_.elapsed_s(fix.time_s);
   const FixNoise noise = statistics_.fix_noise(fix.time_s);
   const ModeTransition transition = mode_transition(elapsed_s, parameters_.model.modes, statistics_.bias_odds());
+  const QualityTransition quality = quality_transition(elapsed_s, parameters_.model.quality);
   next_.clear();
   for (const BiasHypothesis& before : hypotheses_) {
     for (const BiasMode to : kModes) {
-      next_.push_back({before.state, to, 0.0});
-      BiasHypothesis& next = next_.back();
-      continue_bias(next.state, before.mode, to, elapsed_s, parameters_.model.modes);
-      next.weight = before.weight * transition(static_cast<int>(index_of(before.mode)), static_cast<int>(index_of(to)));
+      BiasGaussian state = before.state;
+      continue_bias(state, before.mode, to, elapsed_s, parameters_.model.modes);
+      const double weight =
+          before.weight * transition(static_cast<int>(index_of(before.mode)), static_cast<int>(index_of(to)));
+      for (std::size_t level = 0; level < kQualityLevels; ++level) {
+        next_.push_back(
+            {state, to, level, weight * quality(static_cast<int>(before.quality), static_cast<int>(level))});
+      }
     }
   }
+  const QualityProbabilities expected = quality_of(next_);
   reducer_.merge(next_, parameters_.merge_distance);
   updates_.clear();
   double largest = -std::numeric_limits<double>::infinity();
@@ -116,6 +162,7 @@ bool SwitchingParticleFilter::continue_all(const FixMeasurement& fix, Opinion& o
     opinion.outlier += next_[i].weight * updates_[i].outlier;
     if (updates_[i].white_nis > LearntScale::kMedianNis) opinion.exceeding += next_[i].weight;
   }
+  set_quality(bounded_quality(expected, quality_of(next_), parameters_.model.quality), next_);
   return true;
 }
 
@@ -159,13 +206,15 @@ FixOutcome SwitchingParticleFilter::correct(const FixMeasurement& declared) {
 void SwitchingParticleFilter::correct_velocity(const VelocityMeasurement& measured) {
   if (!is_usable(measured)) return;
   const Eigen::Matrix2d noise = statistics_.velocity_scale() * measured.covariance;
+  const double inflation = statistics_.velocity_inflation(measured.time_s);
   next_ = hypotheses_;
   double exceeding = 0.0;
   double largest = -std::numeric_limits<double>::infinity();
   for (BiasHypothesis& next : next_) {
-    const BiasEkfUpdate update = take_velocity(next.state, measured, noise, parameters_.model.velocity.velocity_dof);
+    const BiasEkfUpdate update =
+        take_velocity(next.state, measured, noise, inflation, parameters_.model.velocity.velocity_dof);
     if (!next.state.is_finite() || std::isnan(update.log_likelihood)) return;
-    if (update.nis > LearntScale::kMedianNis) exceeding += next.weight;
+    if (update.white_nis > LearntScale::kMedianNis) exceeding += next.weight;
     next.weight = std::log(next.weight) + update.log_likelihood;
     largest = std::max(largest, next.weight);
   }
@@ -173,9 +222,10 @@ void SwitchingParticleFilter::correct_velocity(const VelocityMeasurement& measur
   double sum = 0.0;
   for (BiasHypothesis& next : next_) sum += next.weight = std::exp(next.weight - largest);
   for (BiasHypothesis& next : next_) next.weight /= sum;
+  set_quality(quality_of(hypotheses_), next_);  // errors of velocities last, and look like a heading that wanders
   const BiasGaussian before = mixture();
   hypotheses_.swap(next_);
-  statistics_.learn_velocity(exceeding, before, mixture());
+  statistics_.learn_velocity(measured.time_s, exceeding, before, mixture());
   find_clusters();
 }
 

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <limits>
 #include <string>
@@ -13,8 +15,39 @@
 #include "urban_gnss_localization/localizers/switching/fix_noise_model.hpp"
 #include "urban_gnss_localization/localizers/switching/velocity_noise.hpp"
 #include "urban_gnss_localization/motion/dead_reckoning.hpp"
+#include "urban_gnss_localization/motion/odometry_quality.hpp"
 
 namespace urban_gnss {
+
+/// The error that all fixes of a drive share (atmosphere, orbits, antenna): as large as a share of what the fixes' own
+/// errors are learnt to be. It is no state: it is added to the covariance that is published.
+struct CommonErrorParameters {
+  double common_error_share{0.7};
+  double range_common_error_share{0.4};
+  double common_error_min{0.7};
+  double common_error_max{4.0};
+
+  void visit(ParameterVisitor& v) {
+    v("common_error_share", common_error_share, non_negative(), "",
+      "standard deviation of the common error relative to that of a fix");
+    v("range_common_error_share", range_common_error_share, non_negative(), "",
+      "standard deviation of the common error relative to that of a fix which is solved from its ranges");
+    v("common_error_min", common_error_min, non_negative(), "m per axis",
+      "least standard deviation of the common error, but no more than what a fix declares");
+    v("common_error_max", common_error_max, non_negative(), "m per axis",
+      "greatest standard deviation of the common error");
+  }
+  void check(std::vector<std::string>& faults) const {
+    if (common_error_min > common_error_max) faults.push_back("common_error_min: must not exceed common_error_max");
+  }
+  /// m^2 per axis, where fixes have `fix_variance_m2` per axis and declare `declared_m2`.
+  double variance_m2(double fix_variance_m2, double declared_m2, bool of_ranges) const {
+    const double share = of_ranges ? range_common_error_share : common_error_share;
+    const double least = std::min(common_error_min, std::sqrt(declared_m2));
+    const double sigma_m = std::clamp(share * std::sqrt(fix_variance_m2), least, common_error_max);
+    return sigma_m * sigma_m;
+  }
+};
 
 /// The model of odometry and receiver that the filters of the switching bias share.
 struct SwitchingModelParameters {
@@ -24,9 +57,9 @@ struct SwitchingModelParameters {
   VelocityNoiseParameters velocity;
   BiasModeParameters modes;
   OdometryErrorParameters odometry;
+  OdometryQualityParameters quality;
   double yaw_rate_scale_sigma{0.005};
-  double fix_scale_lag{15.0};
-  double common_error_sigma{0.7};
+  CommonErrorParameters common_error;
 
   void visit(ParameterVisitor& v) {
     v.include(fix);
@@ -36,12 +69,10 @@ struct SwitchingModelParameters {
     v.group("velocity_noise", velocity, "Noise of the receiver's velocity (gps/velocity).");
     v.group("bias", modes, "Bias of a fix: none in direct reception, else one that changes slowly, fast, or at once.");
     v.group("odometry", odometry, "Errors of the odometry, which the filter estimates.");
+    v.group("odometry_quality", quality, "How far the odometry wanders, which the filter learns.");
     v("yaw_rate_scale_sigma", yaw_rate_scale_sigma, non_negative(), "",
       "standard deviation of the odometry's relative yaw-rate error, a constant");
-    v("fix_scale_lag", fix_scale_lag, non_negative(), "s",
-      "time between the fixes that are compared by means of the odometry between them; 0: no comparison");
-    v("common_error_sigma", common_error_sigma, non_negative(), "m per axis",
-      "standard deviation of the error that fixes share for long; at most the declared one");
+    v.group("common_error", common_error, "Error that fixes share for a whole drive, which no filter can see.");
   }
 };
 
@@ -120,6 +151,6 @@ BiasEkfUpdate take_fix(BiasGaussian& state, BiasMode mode, const FixMeasurement&
 /// Takes a velocity of the receiver, whose noise is Student's t with `noise` for its covariance ((m/s)^2): it corrects
 /// yaw and speed scale. The likelihood lacks a constant factor.
 BiasEkfUpdate take_velocity(BiasGaussian& state, const VelocityMeasurement& measured, const Eigen::Matrix2d& noise,
-                            double student_dof);
+                            double inflation, double student_dof);
 
 }  // namespace urban_gnss

@@ -29,14 +29,14 @@ struct BiasModeParameters {
   double direct_time{1000.0};
   double slow_bias_time{20.0};
   double fast_bias_time{1.0};
-  double bias_end_time{5.0};
+  double bias_end_time{4.0};
   double jump_share{0.9};
   double slow_bias_walk{0.3};
   double fast_bias_walk{1.0};
-  double jump_sigma{8.0};
+  double jump_sigma{20.0};
   double bias_fade_time{20.0};
   double onset_sigma{0.5};
-  double student_dof{4.0};
+  double student_dof{2.5};
   double outlier_share{0.01};
   double outlier_radius{200.0};
 

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "urban_gnss_localization/common/parameters.hpp"
+#include "urban_gnss_localization/gnss/correlated_errors.hpp"
 #include "urban_gnss_localization/localizers/switching/learnt_scale.hpp"
 #include "urban_gnss_localization/motion/standstill.hpp"
 
@@ -17,8 +18,9 @@ struct FixNoiseModelParameters {
   double first_fix_scale{2.0};
   double fix_covariance_weight{0.5};
   double fix_scale_limit{15.0};
-  double fix_correlation_time{3.0};
-  double parked_correlation_time{30.0};
+  ErrorCorrelation errors{15.0, 40.0};
+  double fix_scale_lag{15.0};
+  double fix_scale_distance{30.0};
 
   void visit(ParameterVisitor& v) {
     v("fix_scale_rate", fix_scale_rate, between(0.0, 1.0), "",
@@ -29,10 +31,11 @@ struct FixNoiseModelParameters {
       "weight of the fluctuations of declared covariances about their recent mean; 1: taken as declared");
     v("fix_scale_limit", fix_scale_limit, at_least(1.0), "",
       "greatest factor by which declared standard deviations may be too small or too large");
-    v("fix_correlation_time", fix_correlation_time, non_negative(), "s",
-      "correlation time of the errors of fixes while the robot moves; 0: independent errors");
-    v("parked_correlation_time", parked_correlation_time, non_negative(), "s",
-      "correlation time of the errors of fixes at a standstill; 0: independent errors");
+    v.include(errors);
+    v("fix_scale_lag", fix_scale_lag, non_negative(), "s",
+      "time between the fixes that are compared by means of the odometry between them; 0: no comparison");
+    v("fix_scale_distance", fix_scale_distance, non_negative(), "m",
+      "way between the fixes that are compared by means of the odometry between them");
   }
 };
 
@@ -44,20 +47,21 @@ struct DeadReckonedFix {
   double walk_m2{0.0};         ///< m^2 per axis, variance of the dead reckoning but for what heading_sigma_rad makes
   double heading_sigma_rad{0.0};
   double time_s{0.0};
+  double way_m{0.0};  ///< since the start
 };
 
 /// The effective noise of a fix. The covariance that its receiver declares rises and falls with its errors, but is too
 /// small or too large by a factor, which is learnt (LearntScale). Errors are correlated in time.
 ///
 /// A receiver that smooths pulls a filter with it: the innovations stay small, and the factor learnt from them falls
-/// without end. Two fixes that are farther apart than it smooths, and the odometry between them, still tell its errors.
+/// without end. Two fixes that are farther apart than their errors last, and the odometry between them, still tell its
+/// errors, as far as the odometry is better than they are.
 ///
-/// markov_inflation() accounts for the correlation of errors.
+/// ErrorCorrelation accounts for the correlation of errors.
 class FixNoiseModel {
  public:
-  /// Requires parameters without faults. `lag_s`: how far apart fixes are compared; 0: they are not.
-  explicit FixNoiseModel(const FixNoiseModelParameters& parameters, double lag_s = 0.0)
-      : parameters_(parameters), lag_s_(lag_s), scale_(fresh_scale()) {}
+  /// Requires parameters without faults.
+  explicit FixNoiseModel(const FixNoiseModelParameters& parameters) : parameters_(parameters), scale_(fresh_scale()) {}
 
   /// Forgets everything, the factor too: a filter that starts anew gives the same again.
   void reset();
@@ -80,7 +84,6 @@ class FixNoiseModel {
 
  private:
   FixNoiseModelParameters parameters_;
-  double lag_s_;
   /// Where nothing is learnt, receivers are right.
   LearntScale fresh_scale() const {
     return {parameters_.fix_scale_rate, parameters_.fix_scale_limit,

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <optional>
 
+#include "urban_gnss_localization/gnss/correlated_errors.hpp"
 #include "urban_gnss_localization/gnss/nominal_cn0.hpp"
 #include "urban_gnss_localization/localizers/switching/bias_ekf.hpp"
 #include "urban_gnss_localization/localizers/switching/fix_noise_model.hpp"
@@ -43,8 +44,13 @@ class FixStatistics {
   void compare_with_odometry(const FixMeasurement& fix, const BiasGaussian& before, const BiasGaussian& after);
 
   double velocity_scale() const { return velocity_scale_.value(); }
+  double velocity_inflation(double time_s) const {
+    return last_velocity_s_
+               ? markov_inflation(time_s - *last_velocity_s_, parameters_.velocity.velocity_correlation_time)
+               : 1.0;
+  }
   /// A velocity was taken; `before` and `after` it, all modes together.
-  void learn_velocity(double exceeding, const BiasGaussian& before, const BiasGaussian& after);
+  void learn_velocity(double time_s, double exceeding, const BiasGaussian& before, const BiasGaussian& after);
 
   /// m^2 per axis, of the error that all fixes share.
   double common_variance_m2() const { return common_variance_m2_; }
@@ -60,6 +66,8 @@ class FixStatistics {
   bool of_ranges_{false};  ///< the last fix
   LearntScale velocity_scale_;
   std::optional<double> last_fix_s_;
+  std::optional<double> last_velocity_s_;
+  double way_m_{0.0};                                     ///< of odometry since the start
   double moved_s_{0.0};                                   ///< of odometry since the start
   Eigen::Vector2d corrections_{Eigen::Vector2d::Zero()};  ///< m, what fixes and velocities have moved the position by
   double common_variance_m2_{0.0};

@@ -43,31 +43,37 @@ class ImmEkf : public Localizer {
   PoseEstimate estimate() const override;
   LocalizerHealth health() const override;
 
-  const ModeProbabilities& mode_probabilities() const { return probability_; }
+  /// Of the bias, all qualities of the odometry together.
+  ModeProbabilities mode_probabilities() const;
+  QualityProbabilities quality_probabilities() const;
   /// The state given the mode at the last fix.
-  const Gaussian& given(BiasMode mode) const { return filters_[index_of(lasting(mode))]; }
+  Gaussian given(BiasMode mode) const;
   /// All modes together.
   Gaussian mixture() const;
 
  private:
-  /// The filters of all modes that a fix may have, each with the fix taken.
+  static constexpr std::size_t kFilters = kQualityLevels * kLastingModes;
+  static constexpr std::size_t kBranches = kQualityLevels * kContinuations;
+  /// The filters of all modes that a fix may have at each quality, each with the fix taken.
   struct Branches {
-    std::array<Gaussian, kContinuations> filters;
-    std::array<BiasEkfUpdate, kContinuations> updates;
-    std::array<double, kContinuations> probability{};  ///< posterior, of the modes
+    std::array<Gaussian, kBranches> filters;
+    std::array<BiasEkfUpdate, kBranches> updates;
+    std::array<double, kBranches> probability{};  ///< posterior
     bool are_finite{false};
   };
   Branches branch(const FixMeasurement& fix) const;
+  /// Weighs the filters of each quality so that they sum to `target`.
+  void set_quality(const QualityProbabilities& target);
   /// Goes on with the filters of the branches, those of slow bias and of a jump as one.
   void merge(const Branches& branches);
-  Gaussian mixed_into(BiasMode to, const ModeTransition& transition, double elapsed_s) const;
 
   ImmEkfParameters parameters_;
   MotionParameters motion_;
   double nis_threshold_;
   FixStatistics statistics_;
-  std::array<Gaussian, kLastingModes> filters_;
-  ModeProbabilities probability_{ModeProbabilities::Zero()};
+  std::array<OdometryErrorParameters, kQualityLevels> levels_;
+  std::array<Gaussian, kFilters> filters_;
+  std::array<double, kFilters> probability_{};
 };
 
 }  // namespace urban_gnss

@@ -19,18 +19,23 @@ class LearntScale {
   LearntScale(double rate, double limit, double first = 1.0)
       : rate_(rate),
         log_limit_(2.0 * std::log(limit)),
-        log_scale_(std::clamp(std::log(first), -log_limit_, log_limit_)) {}
+        log_first_(std::clamp(std::log(first), -log_limit_, log_limit_)),
+        log_scale_(log_first_) {}
 
   double value() const { return std::exp(log_scale_); }
   /// One measurement, with a share `exceeding` (0 to 1) of its NIS, at k times the declared covariance, beyond
-  /// kMedianNis.
-  void learn(double exceeding) {
-    log_scale_ = std::clamp(log_scale_ + rate_ * (2.0 * exceeding - 1.0), -log_limit_, log_limit_);
+  /// kMedianNis. `share` (0 to 1) of the innovation's covariance is the measurement's: as much says it of k, and for
+  /// the rest k returns to what it was at first.
+  void learn(double exceeding, double share = 1.0) {
+    const double returns = std::clamp(log_first_ - log_scale_, -1.0, 1.0);
+    const double step = share * (2.0 * exceeding - 1.0) + (1.0 - share) * returns;
+    log_scale_ = std::clamp(log_scale_ + rate_ * step, -log_limit_, log_limit_);
   }
 
  private:
   double rate_;
   double log_limit_;
+  double log_first_;
   double log_scale_;
 };
 

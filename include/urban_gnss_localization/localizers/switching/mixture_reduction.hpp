@@ -9,10 +9,11 @@
 
 namespace urban_gnss {
 
-/// One hypothesis of the switching bias: the state given its modes.
+/// One hypothesis of the switching bias: the state given its modes and the quality of the odometry.
 struct BiasHypothesis {
   BiasGaussian state;
   BiasMode mode{BiasMode::kDirect};
+  std::size_t quality{0};  ///< level of the odometry, below kQualityLevels
   double weight{0.0};
 };
 
@@ -35,9 +36,9 @@ class MixtureReducer {
   /// For up to `most_before` hypotheses.
   explicit MixtureReducer(std::size_t most_before);
 
-  /// Those of the same mode whose marginal_distance() to a heavier one is less than `distance`, as it is where their
-  /// histories differ long ago alone, become one with it, with their moments. Leaves them in the order of the weights
-  /// they had.
+  /// Those of the same mode and quality whose marginal_distance() to a heavier one is less than `distance`, as it is
+  /// where their histories differ long ago alone, become one with it, with their moments. Leaves them in the order of
+  /// the weights they had.
   void merge(std::vector<BiasHypothesis>& hypotheses, double distance);
 
   /// Those with a weight above a threshold c stay as they are; one of a smaller weight w survives with probability

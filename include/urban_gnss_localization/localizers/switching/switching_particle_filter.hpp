@@ -1,5 +1,7 @@
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -86,6 +88,8 @@ class SwitchingParticleFilter : public ParticleLocalizer {
   /// Pose and cloud of the particles as they stand.
   void update_estimate();
   void draw_cloud();
+  /// One hypothesis more than are kept, by rounding; at a start one for each quality of the odometry.
+  std::size_t capacity() const { return std::max<std::size_t>(most_, kQualityLevels) + 1; }
 
   SwitchingParticleFilterParameters parameters_;
   MotionParameters motion_;
@@ -93,6 +97,7 @@ class SwitchingParticleFilter : public ParticleLocalizer {
   std::size_t most_;
   RandomEngine engine_;
   FixStatistics statistics_;
+  std::array<OdometryErrorParameters, kQualityLevels> levels_;
   MixtureReducer reducer_;
   std::vector<BiasHypothesis> hypotheses_;
   std::vector<BiasHypothesis> next_;

@@ -11,7 +11,8 @@ struct VelocityNoiseParameters {
   double velocity_scale_rate{0.03};
   double first_velocity_scale{4.0};
   double velocity_scale_limit{20.0};
-  double velocity_dof{2.0};
+  double velocity_dof{1.5};
+  double velocity_correlation_time{2.0};
 
   void visit(ParameterVisitor& v) {
     v("velocity_scale_rate", velocity_scale_rate, between(0.0, 1.0), "",
@@ -22,6 +23,8 @@ struct VelocityNoiseParameters {
       "greatest factor by which declared standard deviations of velocities may be too small or too large");
     v("velocity_dof", velocity_dof, positive(), "",
       "degrees of freedom of Student's t noise of a velocity; large: Gaussian");
+    v("velocity_correlation_time", velocity_correlation_time, non_negative(), "s",
+      "correlation time of the errors of velocities; 0: independent errors");
   }
 
   /// Where nothing is learnt, receivers are right.
