@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iomanip>
+#include <numeric>
 #include <sstream>
 #include <stdexcept>
 
@@ -20,6 +21,8 @@ constexpr int kIterations = 20;             // the weights settle within a few
 constexpr double kCauchyTuning = 2.3849;    // 95 % efficiency where the noise is Gaussian after all
 constexpr double kRayleighMedian = 1.1774;  // median length of a 2-D vector with unit variance per axis
 constexpr double kMaxNumber = 1e8;          // in m farther than round the Earth; squares stay finite
+constexpr double kRigidShare = 0.7;         // of the fixes in the window
+constexpr double kRigidFactor = 1.5;        // of the declared standard deviation
 constexpr double kAgreement = 9.2103;       // chi-square quantile, 99 %, 2 degrees of freedom
 
 double upper_median(std::vector<double> values) {
@@ -77,6 +80,13 @@ struct Observations {
   void inflate(double inflation) {
     const double limit = std::max(1.0, static_cast<double>(count()));
     for (double& weight : weights) weight /= std::min(limit, inflation);
+  }
+  double total_weight() const { return std::accumulate(weights.begin(), weights.end(), 0.0); }
+  /// Of those that have weight.
+  double total_information() const {
+    double sum = 0.0;
+    for (std::size_t i = 0; i < weights.size(); ++i) sum += weights[i] > 0.0 ? information[i] : 0.0;
+    return sum;
   }
   std::size_t count() const {
     return static_cast<std::size_t>(std::count_if(weights.begin(), weights.end(), [](double w) { return w > 0.0; }));
@@ -138,6 +148,11 @@ std::optional<PoseEstimate> HeadingInitializer::estimate() const {
   result.covariance = found->yaw_variance * per_yaw * per_yaw.transpose();
   result.covariance.topLeftCorner<2, 2>() += found->position_variance * Eigen::Matrix2d::Identity();
   return result;
+}
+
+bool HeadingInitializer::is_rigid() const {
+  const auto found = consensus();
+  return found && found->agreeing >= kRigidShare && found->noise_sigma <= kRigidFactor * found->declared_sigma;
 }
 
 PoseEstimate HeadingInitializer::without_heading() const {
@@ -259,7 +274,11 @@ std::optional<HeadingInitializer::Consensus> HeadingInitializer::consensus() con
   velocities.keep_agreeing();
   if (fixes.count() == 0) return std::nullopt;
   align_all();
+  result.declared_sigma = std::sqrt(static_cast<double>(fixes.count()) / fixes.total_information());
+  result.agreeing = static_cast<double>(fixes.count()) / static_cast<double>(samples_.size());
   fixes.weigh_by_variance(3.0);
+  result.noise_sigma = std::sqrt(static_cast<double>(fixes.count()) / fixes.total_weight());
+  fixes.inflate(fix_inflation());
   velocities.weigh_by_variance(1.0);
   align_all();
   if (result.alignment.speed_factor < kMinSpeedFactor) {
@@ -273,10 +292,10 @@ std::optional<HeadingInitializer::Consensus> HeadingInitializer::consensus() con
     if (fixes.weights[i] > 0.0) result.latest = i;
   }
   const Alignment& alignment = result.alignment;
-  result.noise_sigma = std::sqrt(static_cast<double>(fixes.count()) / alignment.information);
   result.position_variance = 1.0 / alignment.information;
-  result.yaw_variance = 1.0 / (alignment.lever_information + alignment.velocity_information);
-  result.velocity_yaw_variance = 1.0 / alignment.velocity_information;
+  const double walk = odometry_yaw_variance();
+  result.yaw_variance = 1.0 / (alignment.lever_information + alignment.velocity_information) + walk;
+  result.velocity_yaw_variance = 1.0 / alignment.velocity_information + walk;
   return result;
 }
 
@@ -284,6 +303,22 @@ double HeadingInitializer::velocity_inflation() const {
   if (velocities_.size() < 2) return 1.0;
   const double span_s = to_seconds(velocities_.back().stamp - velocities_.front().stamp);
   return markov_inflation(span_s / static_cast<double>(velocities_.size() - 1), kVelocityCorrelation_s);
+}
+
+double HeadingInitializer::fix_inflation() const {
+  double way_m = 0.0;
+  for (std::size_t i = 1; i < samples_.size(); ++i) {
+    way_m += (samples_[i].odometry.position() - samples_[i - 1].odometry.position()).norm();
+  }
+  const double steps = static_cast<double>(samples_.size()) - 1.0;
+  const double span_s = to_seconds(samples_.back().fix.stamp - samples_.front().fix.stamp);
+  return steps > 0.0 ? parameters_.fix_errors.inflation(way_m / steps, span_s / steps) : 1.0;
+}
+
+double HeadingInitializer::odometry_yaw_variance() const {
+  // Of a random walk over the window, its end relative to its mean: a third of its whole variance.
+  const double span_s = to_seconds(samples_.back().fix.stamp - samples_.front().fix.stamp);
+  return parameters_.initialization_heading_walk * parameters_.initialization_heading_walk * span_s / 3.0;
 }
 
 double HeadingInitializer::distance_moved() const {

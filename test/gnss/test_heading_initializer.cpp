@@ -71,6 +71,14 @@ TEST(HeadingInitializer, RecoversAnyPoseWithoutNoise) {
   }
 }
 
+/// For drives whose fixes have independent errors and whose odometry is exact.
+HeadingInitializerParameters independent() {
+  HeadingInitializerParameters parameters;
+  parameters.initialization_heading_walk = 0.0;
+  parameters.fix_errors = {0.0, 0.0};
+  return parameters;
+}
+
 // 300 runs, each examined at its first estimate: the moment at which a localizer starts from it.
 TEST(HeadingInitializer, FirstEstimateIsConsistentOverSeeds) {
   constexpr int kRuns = 300;
@@ -81,7 +89,7 @@ TEST(HeadingInitializer, FirstEstimateIsConsistentOverSeeds) {
     Drive drive;
     drive.map_from_odometry = random_pose(generator);
     drive.turn_rate = run % 2 == 0 ? 0.03 : -0.005;
-    HeadingInitializer initializer({});
+    HeadingInitializer initializer(independent());
     bool found = false;
     for (int second = 0; second < 60 && !found; ++second) {
       initializer.add(drive.odometry(second), drive.fix(second, generator));
@@ -103,13 +111,52 @@ TEST(HeadingInitializer, FirstEstimateIsConsistentOverSeeds) {
   EXPECT_GT(nees_sum / kRuns, 2.0);
 }
 
+// Errors that last, as those of real fixes do: taken as independent, the heading would be surer than it is.
+TEST(HeadingInitializer, ErrorsThatLastAreInTheCovariance) {
+  const auto nees_with = [](const HeadingInitializerParameters& parameters) {
+    constexpr int kRuns = 200;
+    constexpr double kSigma_m = 2.0;
+    double sum = 0.0;
+    int found = 0;
+    for (int run = 0; run < kRuns; ++run) {
+      std::mt19937_64 generator(run);
+      std::normal_distribution<double> normal;
+      Drive drive;
+      drive.map_from_odometry = random_pose(generator);
+      drive.sigma = 0.0;
+      drive.declared_sigma = kSigma_m;
+      HeadingInitializer initializer(parameters);
+      const double kept = std::exp(-1.0 / 15.0 - 1.0 / 40.0);  // 1 m and 1 s from fix to fix
+      Eigen::Vector2d lasting(kSigma_m * normal(generator), kSigma_m * normal(generator));
+      for (int second = 0; second < 60; ++second) {
+        const double fresh = kSigma_m * std::sqrt(1.0 - kept * kept);
+        lasting = kept * lasting + Eigen::Vector2d(fresh * normal(generator), fresh * normal(generator));
+        LocalFix fix = drive.fix(second, generator);
+        fix.position += lasting;
+        initializer.add(drive.odometry(second), fix);
+      }
+      const auto estimate = initializer.estimate();
+      if (!estimate) continue;
+      ++found;
+      const double yaw_error = error(estimate->pose, drive.truth(59)).z();
+      sum += yaw_error * yaw_error / estimate->covariance(2, 2);
+    }
+    EXPECT_GT(found, kRuns / 2);
+    return sum / found;
+  };
+  HeadingInitializerParameters lasting = independent();
+  lasting.fix_errors = HeadingInitializerParameters{}.fix_errors;
+  EXPECT_LT(nees_with(lasting), 1.6);
+  EXPECT_GT(nees_with(independent()), 2.5);
+}
+
 TEST(HeadingInitializer, OneSpikeOf1600MetresDoesNotSpoilIt) {
   for (int spike = 0; spike < 20; ++spike) {
     for (const double direction : {0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0}) {
       std::mt19937_64 generator(spike);
       Drive drive;
       drive.map_from_odometry = {10.0, 20.0, 2.5};
-      HeadingInitializer initializer({});
+      HeadingInitializer initializer(independent());
       for (int second = 0; second < 20; ++second) {
         LocalFix fix = drive.fix(second, generator);
         if (second == spike) fix.position += 1600.0 * Eigen::Vector2d(std::cos(direction), std::sin(direction));
@@ -229,7 +276,7 @@ TEST(HeadingInitializer, NeedsFourFixesAndAWayOfTwoSigma) {
   drive.sigma = 0.0;
   drive.declared_sigma = 3.0;
   drive.turn_rate = 0.001;
-  HeadingInitializerParameters parameters;
+  HeadingInitializerParameters parameters = independent();
   parameters.initialization_heading_sigma = 1.0;
   HeadingInitializer initializer(parameters);
   int second = 0;

@@ -8,6 +8,7 @@
 
 #include "urban_gnss_localization/common/parameters.hpp"
 #include "urban_gnss_localization/geometry/pose2.hpp"
+#include "urban_gnss_localization/gnss/correlated_errors.hpp"
 #include "urban_gnss_localization/gnss/fix.hpp"
 
 namespace urban_gnss {
@@ -17,6 +18,8 @@ struct HeadingInitializerParameters {
   double initialization_heading_sigma{0.2};
   double initialization_timeout{60.0};
   double initialization_window{60.0};
+  double initialization_heading_walk{0.01};
+  ErrorCorrelation fix_errors{15.0, 40.0};
 
   void visit(ParameterVisitor& v) {
     v("initialization_heading_sigma", initialization_heading_sigma, open_between(0.0, 1.0), "rad",
@@ -25,6 +28,9 @@ struct HeadingInitializerParameters {
       "time after the first fix at which the localizer starts without a heading");
     v("initialization_window", initialization_window, positive(), "s",
       "length of the window of fixes from which the start is found");
+    v("initialization_heading_walk", initialization_heading_walk, non_negative(), "rad/sqrt(s)",
+      "random walk of the odometry's heading within the window");
+    v.group("initialization_fix_errors", fix_errors, "How long the errors of the fixes in the window last.");
   }
   void check(std::vector<std::string>& faults) const;
 };
@@ -33,6 +39,7 @@ struct HeadingInitializerParameters {
 struct VelocityPair {
   Stamp stamp{0};
   Eigen::Vector2d odometry{Eigen::Vector2d::Zero()};        ///< m/s, in the odometry's frame
+  double yaw_rad{0.0};                                      ///< of the base in that frame
   Eigen::Vector2d measured{Eigen::Vector2d::Zero()};        ///< m/s, east and north
   Eigen::Matrix2d covariance{Eigen::Matrix2d::Identity()};  ///< (m/s)^2, of the measured one
 };
@@ -50,9 +57,10 @@ struct VelocityPair {
 /// 4. The yaw's information (1 / rad²) is the sum of these weights times squared lever arms about the centroid (fixes)
 ///    and times squared speeds (velocities); the centroid's variance is 1 / the sum of the fixes' weights.
 ///
-/// The errors of fixes are taken as independent, those of velocities as a Markov process of 1 s: a reflection stays for
-/// some of them. A bias that the fixes share is not seen; it stays in the position and is not in the covariance. The
-/// odometry's heading is taken to be right within the window.
+/// The errors of fixes are correlated by distance and time (ErrorCorrelation), those of velocities over 1 s: a
+/// reflection stays for some of them. A bias that the fixes share is not seen; it stays in the position and is not in
+/// the covariance. The odometry's heading is taken to be right for the alignment; that it walks makes the yaw's
+/// variance larger.
 class HeadingInitializer {
  public:
   /// Requires parameters without faults.
@@ -74,6 +82,10 @@ class HeadingInitializer {
   /// farther than 2 standard deviations of a fix from where the window begins (a distance, not a length of path: the
   /// jitter of a parked robot's odometry adds up to a long path).
   std::optional<PoseEstimate> estimate() const;
+
+  /// Whether most fixes of the window agree with the odometry as well as their covariances say: then they are good, and
+  /// an estimate far from them is wrong. Reflections bend the path of the fixes.
+  bool is_rigid() const;
 
   /// A start without a heading: the position at the last fix, yaw 0 with the variance of a uniform one (pi²/3). The
   /// position is that of the latest fix that agrees with the others, and its covariance is enlarged by the way
@@ -109,6 +121,8 @@ class HeadingInitializer {
     Alignment alignment;
     std::size_t latest;            ///< index of the last fix that agrees
     double noise_sigma;            ///< m, of a fix per axis
+    double declared_sigma;         ///< m, the same as declared
+    double agreeing;               ///< share of the fixes, 0 to 1
     double position_variance;      ///< m^2, per axis, of the centroid
     double yaw_variance;           ///< rad^2
     double velocity_yaw_variance;  ///< rad^2, of the velocities alone
@@ -120,6 +134,10 @@ class HeadingInitializer {
   std::optional<Consensus> consensus() const;
   /// By which the mean of the velocities' correlated errors varies more than that of independent ones.
   double velocity_inflation() const;
+  /// The same of the fixes.
+  double fix_inflation() const;
+  /// rad^2, of the heading at the last fix relative to that of the whole window.
+  double odometry_yaw_variance() const;
   double distance_moved() const;
   bool is_known_by_velocities(const Consensus& found) const;
   bool is_converged(const Consensus& found) const;
