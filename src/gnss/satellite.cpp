@@ -42,6 +42,17 @@ bool is_received(const SatelliteObservation& satellite) {
   return satellite.tracked && has_direction(satellite) && has_cn0(satellite);
 }
 
+double residual_rms_m(const std::vector<SatelliteObservation>& satellites) {
+  double squares = 0.0;
+  int count = 0;
+  for (const SatelliteObservation& each : satellites) {
+    if (!is_received(each) || !std::isfinite(each.residual_m)) continue;
+    squares += each.residual_m * each.residual_m;
+    ++count;
+  }
+  return count > 0 ? std::sqrt(squares / count) : 0.0;
+}
+
 std::string satellite_name(const SatelliteId& id) {
   const std::string number = std::to_string(id.svid);
   return rinex_letter(id.constellation) + (number.size() < 2 ? "0" + number : number);

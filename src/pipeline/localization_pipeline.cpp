@@ -1,5 +1,6 @@
 #include "urban_gnss_localization/pipeline/localization_pipeline.hpp"
 
+#include <cmath>
 #include <sstream>
 #include <utility>
 
@@ -9,6 +10,13 @@
 namespace urban_gnss {
 
 using Level = PipelineEvent::Level;
+
+namespace {
+
+/// Standard deviation below which a heading tells forwards from backwards.
+constexpr double kKnownHeading_rad = 0.15;
+
+}  // namespace
 
 Pose2 map_to_odometry(const LocalizationOutput& output) {
   return compose(output.estimate.pose, inverse(output.odometry_pose));
@@ -23,10 +31,12 @@ LocalizationPipeline::LocalizationPipeline(const LocalizationParameters& paramet
       datum_(parameters.datum),
       history_(kHistory_s),
       yaw_rate_(parameters.imu, parameters.input.stamps.odometry_gap),
+      speed_(parameters.speed),
       velocities_(parameters.velocity),
       fixes_(parameters.input.fix_validation),
       biases_(parameters.bias),
       start_(parameters.start),
+      integrity_(parameters.integrity),
       reporter_(parameters.status, parameters.input.stamps.odometry_gap) {
   reset({});
 }
@@ -37,11 +47,13 @@ void LocalizationPipeline::reset(const std::string& why) {
   history_.clear();
   ++epoch_;
   yaw_rate_.reset();
+  speed_.reset();
   velocities_.reset();
   fixes_.reset();
   satellites_.reset();
   biases_.reset();
   start_.reset();
+  integrity_.reset();
   reporter_.reset();
   if (frame()) event(Level::kInfo, datum_.describe());
 }
@@ -64,7 +76,8 @@ void LocalizationPipeline::add_odometry(const OdometrySample& sample) {
 
   const Stamp since = history_.empty() ? sample.stamp : history_.latest();
   const double elapsed_s = to_seconds(sample.stamp - since);
-  const Twist2 twist = yaw_rate_.twist_of(sample, since, events_);
+  Twist2 twist = yaw_rate_.twist_of(sample, since, events_);
+  twist.speed_mps = speed_.speed_of(twist.speed_mps, sample.stamp, elapsed_s, events_);
   if (elapsed_s > parameters_.input.stamps.odometry_gap) forget_odometry(elapsed_s);
   history_.add(sample.stamp, twist);
   if (initialized() && elapsed_s > 0.0) {
@@ -74,7 +87,7 @@ void LocalizationPipeline::add_odometry(const OdometrySample& sample) {
   if (!initialized() && start_.given() && frame()) start_from({*start_.given(), "the given pose"});
   process_velocities();
   process_fixes();
-  if (initialized()) outputs_.push_back({sample.stamp, localizer_->estimate(), sample.pose, twist});
+  if (initialized()) outputs_.push_back({sample.stamp, estimate(), sample.pose, twist});
 }
 
 void LocalizationPipeline::forget_odometry(double gap_s) {
@@ -122,10 +135,25 @@ void LocalizationPipeline::process_velocity(const RawVelocity& velocity) {
     return;
   }
   start_.add_velocity(matched->pair);
+  compare_speed(*matched);
   if (!initialized()) return;
   localizer_->correct_velocity(matched->measurement);
   reporter_.count_velocity();
   guard_against_non_finite();
+}
+
+void LocalizationPipeline::compare_speed(const MatchedVelocity& velocity) {
+  const Eigen::Vector2d& measured = velocity.measurement.velocity;
+  ReceiverSpeed speed;
+  speed.stamp = velocity.pair.stamp;
+  speed.speed_mps = measured.norm();
+  speed.sigma_mps = std::sqrt(0.5 * velocity.measurement.covariance.trace());
+  if (initialized() && localizer_->health().heading_sigma_rad < kKnownHeading_rad) {
+    const double turned = velocity.pair.yaw_rad - history_.pose_at(history_.latest())->yaw;
+    const double yaw = localizer_->pose().yaw + turned;
+    speed.forward_mps = measured.x() * std::cos(yaw) + measured.y() * std::sin(yaw);
+  }
+  speed_.compare(speed, events_);
 }
 
 void LocalizationPipeline::add_satellites(Stamp stamp, std::vector<SatelliteObservation> satellites) {
@@ -210,7 +238,8 @@ void LocalizationPipeline::start_with(const ValidatedFix& fix) {
 }
 
 bool LocalizationPipeline::restart_with(const ValidatedFix& fix) {
-  const auto start = start_.find_restart(with_odometry(fix.fix), *predicted_antenna(fix.fix.stamp), events_);
+  const auto start = start_.find_restart(with_odometry(fix.fix), *predicted_antenna(fix.fix.stamp),
+                                         integrity_.is_persistent(), events_);
   if (!start) return false;
   decide_unexamined(fix, start->fix_use, true);
   start_from(*start);
@@ -238,6 +267,9 @@ void LocalizationPipeline::correct_with(const ValidatedFix& fix) {
   measurement.stamp = stamp;
   if (const SatelliteEpoch* epoch = satellites_.take(stamp)) measurement.satellites = epoch->satellites;
 
+  if (residual_rms_m(measurement.satellites) <= parameters_.integrity.residual_limit) {
+    watch_integrity(fix, measurement.antenna_in_body);
+  }
   FixOutcome outcome = localizer_->correct(measurement);
   outcome.stamp = stamp;
   outcome.covariance_clamped = fix.outcome.covariance_clamped;
@@ -245,6 +277,17 @@ void LocalizationPipeline::correct_with(const ValidatedFix& fix) {
   if (outcome.reason.empty()) outcome.reason = fix.outcome.reason;
   decide(std::move(outcome));
   guard_against_non_finite();
+}
+
+void LocalizationPipeline::watch_integrity(const ValidatedFix& fix, const Eigen::Vector2d& antenna_in_body) {
+  const PoseEstimate before = localizer_->estimate();
+  const bool was_contradicted = integrity_.contradiction().has_value();
+  integrity_.add({fix.fix.stamp, fix.fix.position - transform_point(before.pose, antenna_in_body), fix.fix.covariance,
+                  before.covariance.topLeftCorner<2, 2>()});
+  const auto& contradiction = integrity_.contradiction();
+  if (contradiction.has_value() == was_contradicted) return;
+  event(contradiction ? Level::kWarn : Level::kInfo,
+        contradiction ? describe(*contradiction) : "estimate and fixes agree again");
 }
 
 void LocalizationPipeline::decide_stale(FixOutcome outcome, const std::string& reason) {
@@ -285,6 +328,8 @@ void LocalizationPipeline::set_datum(const GeodeticPosition& datum) {
 void LocalizationPipeline::start_from(const Start& start) {
   localizer_->initialize(start.estimate);
   start_.note(start);
+  integrity_.restart();
+  speed_.forget_heading();
   biases_.forget_radius();
   const Pose2& pose = start.estimate.pose;
   std::ostringstream text;
@@ -305,6 +350,12 @@ void LocalizationPipeline::guard_against_non_finite() {
   start_.lose_place();
 }
 
+PoseEstimate LocalizationPipeline::estimate() const {
+  PoseEstimate published = localizer_->estimate();
+  published.covariance.topLeftCorner<2, 2>() += integrity_.covariance();
+  return published;
+}
+
 LocalizationReport LocalizationPipeline::report() const {
   PipelineStatus status;
   if (!history_.empty()) status.last_odometry = history_.latest();
@@ -314,6 +365,10 @@ LocalizationReport LocalizationPipeline::report() const {
   status.is_lost = start_.is_lost();
   status.waiting_for = waiting_for();
   status.bias_radius_m = biases_.radius_m();
+  status.complaint = integrity_.contradiction() ? describe(*integrity_.contradiction()) : speed_.complaint();
+  status.time_to_detect_s = integrity_.time_to_detect_s();
+  status.time_to_recover_s = integrity_.time_to_recover_s();
+  status.contradiction_m2 = integrity_.covariance();
   return reporter_.report(status, *localizer_);
 }
 

@@ -58,7 +58,7 @@ std::optional<Start> StartSupervisor::find_start(const StartFix& fix) {
 }
 
 std::optional<Start> StartSupervisor::find_restart(const StartFix& fix, const Eigen::Vector2d& predicted,
-                                                   std::vector<PipelineEvent>& events) {
+                                                   bool is_contradicted, std::vector<PipelineEvent>& events) {
   const bool is_remembered = remember(fix);
   std::optional<Start> start;
   if (heading_is_unknown_ && is_remembered) start = from_motion(fix);
@@ -66,7 +66,8 @@ std::optional<Start> StartSupervisor::find_restart(const StartFix& fix, const Ei
     start->fix_use = "used for a start with heading";
     return start;
   }
-  if (is_lost_by(fix.fix, predicted, events) && is_remembered) start = from_motion(fix);
+  const bool is_wrong = is_lost_by(fix.fix, predicted, events) || is_contradicted;
+  if (is_wrong && is_remembered && heading_.is_rigid()) start = from_motion(fix);
   if (start) start->fix_use = "used for a new start";
   return start;
 }

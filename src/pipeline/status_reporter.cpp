@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "text.hpp"
+#include "urban_gnss_localization/geometry/protection_level.hpp"
 
 namespace urban_gnss {
 namespace {
@@ -57,6 +58,8 @@ void StatusReporter::note_start_fix(const FixOutcome& outcome, bool is_start) {
 
 LocalizationReport StatusReporter::report(const PipelineStatus& status, const Localizer& localizer) const {
   LocalizationReport report = counts_;
+  report.time_to_detect_s = status.time_to_detect_s;
+  report.time_to_recover_s = status.time_to_recover_s;
   report.bias_radius_m = status.bias_radius_m;
   if (status.last_odometry && last_used_) report.fix_age_s = to_seconds(*status.last_odometry - *last_used_);
   if (status.last_odometry && status.last_fix) {
@@ -69,7 +72,9 @@ LocalizationReport StatusReporter::report(const PipelineStatus& status, const Lo
   }
   report.health = localizer.health();
   if (std::isfinite(report.health.bias_radius_m)) report.bias_radius_m = report.health.bias_radius_m;
-  report.position_sigma_m = largest_sigma(localizer.estimate().covariance.topLeftCorner<2, 2>());
+  report.position_sigma_m =
+      largest_sigma(localizer.estimate().covariance.topLeftCorner<2, 2>() + status.contradiction_m2);
+  report.protection_level_m = protection_level_m(report.position_sigma_m);
   report.heading_converged = report.health.heading_sigma_rad < parameters_.heading_converged_sigma;
   judge(status, report);
   return report;
@@ -90,6 +95,7 @@ std::string StatusReporter::complaint(const PipelineStatus& status, const Locali
     return last_used_ ? "no fix was used for " + seconds_text(report.fix_age_s) : "no fix was used yet";
   }
   if (report.odometry_age_s > odometry_gap_s_) return "no odometry for " + seconds_text(report.odometry_age_s);
+  if (!status.complaint.empty()) return status.complaint;
   if (!report.heading_converged) return "heading not known yet";
   if (report.health.cluster_mass < kLeastClusterMass) {
     return "particles disagree: no cluster holds half of the weight";

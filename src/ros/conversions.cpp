@@ -271,6 +271,9 @@ msgs::LocalizationStatus to_message(const LocalizationReport& report, const Loca
   message.fix_age = report.fix_age_s;
   message.odometry_age = report.odometry_age_s;
   message.position_sigma = report.position_sigma_m;
+  message.protection_level = report.protection_level_m;
+  message.time_to_detect = report.time_to_detect_s;
+  message.time_to_recover = report.time_to_recover_s;
   message.heading_sigma = report.health.heading_sigma_rad;
   message.heading_converged = report.heading_converged;
   message.bias_radius = report.bias_radius_m;

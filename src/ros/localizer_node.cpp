@@ -288,6 +288,7 @@ void LocalizerNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status
   status.add("fixes with ranges", report.fixes_with_ranges);
   status.add("velocities used", report.velocities_used);
   status.add("position sigma (m)", report.position_sigma_m);
+  status.add("protection level (m)", report.protection_level_m);
   status.add("heading sigma (rad)", report.health.heading_sigma_rad);
   status.add("bias radius (m)", report.bias_radius_m);
   status.add("gate inert", report.health.is_gate_inert);

@@ -120,7 +120,7 @@ TEST(FaultExperiment, FaultsAreSeenInTheEstimate) {
   EXPECT_GT(score_of("none").inside_95, 0.85);
   EXPECT_EQ(score_of("none").unhealthy_after_s, kInfinity);
   EXPECT_GT(score_of("pose_30m_off").worst_m, 25.0);
-  EXPECT_GT(score_of("speed_plus_20mps").worst_m, 10.0);
+  EXPECT_LT(score_of("speed_plus_20mps").worst_m, 5.0) << "left out, as no acceleration explains it";
   EXPECT_GT(score_of("dead_encoder").worst_m, 5.0);
   EXPECT_GT(score_of("fixes_1.5s_late").worst_m, 5.0);  // at 10 m/s
 }

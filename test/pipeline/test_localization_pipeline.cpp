@@ -332,6 +332,31 @@ std::string trace(const std::string& base, const std::string& change, bool wants
   return out.str();
 }
 
+/// A pose that is 40 m off, a glitch of the speed at 70 s, and a dead encoder from 80 s on.
+std::string trace_of_faults(const std::string& changes) {
+  Rig rig(with(with(LocalizationParameters{}, "{datum: [33.0, 130.0, 20.0], initial_pose: [0.0, 40.0, 0.0]}"), changes),
+          std::make_unique<FakeLocalizer>());
+  SatelliteObservation satellite;
+  satellite.id = {Constellation::kGps, 7};
+  satellite.look = {1.0, 1.0};
+  satellite.cn0_dbhz = 45.0;
+  satellite.residual_m = 1.0;
+  std::ostringstream out;
+  for (int k = 0; k <= 900; ++k) {
+    const double time = 0.1 * k;
+    if (k % 10 == 0) rig.pipeline.add_satellites(Rig::at(time), {satellite});
+    if (k % 10 == 0) rig.fix(time);
+    if (k % 10 == 0) rig.pipeline.add_velocity(Rig::velocity(time));
+    OdometrySample sample = Rig::odometry(time);
+    if (k == 700) sample.twist.speed_mps = 100.0;
+    if (k > 800) sample.twist.speed_mps = 0.0;
+    rig.pipeline.add_odometry(sample);
+    const LocalizationReport report = rig.pipeline.report();
+    out << report.healthy << report.position_sigma_m << ' ' << rig.fake->state.pose.x << '\n';
+  }
+  return out.str();
+}
+
 TEST(LocalizationPipeline, EveryParameterHasAnEffect) {
   const std::string datum = "datum: [33.0, 130.0, 20.0]";
   const std::string given = kGiven;
@@ -365,8 +390,19 @@ TEST(LocalizationPipeline, EveryParameterHasAnEffect) {
       {"initialization_heading_sigma", {datum, "0.05"}},
       {"initialization_timeout", {datum, "2.0"}},
       {"initialization_window", {datum, "2.0"}},
+      {"initialization_heading_walk", {datum, "0.2"}},
+      {"correlation_distance", {datum, "1.0"}},
+      {"correlation_time", {datum, "1.0"}},
   };
+  const std::map<std::string, std::string> of_faults = {
+      {"max_acceleration", "1.0e+4"}, {"check_wheels", "false"},         {"integrity_window", "16.0"},
+      {"integrity_limit", "100.0"},   {"contradiction_patience", "2.0"}, {"residual_limit", "0.5"},
+  };
+  for (const auto& [name, value] : of_faults) {
+    EXPECT_NE(trace_of_faults(name + ": " + value), trace_of_faults("{}")) << name;
+  }
   for (const std::string& name : parameter_names(LocalizationParameters{})) {
+    if (of_faults.count(name) > 0) continue;
     const auto found = changes.find(name);
     ASSERT_NE(found, changes.end()) << name << " is not examined";
     const auto& [base, value] = found->second;

@@ -24,10 +24,10 @@ struct Supervised {
   }
   std::optional<Start> find_start() { return supervisor.find_start({fix(), history, antenna}); }
   /// By a fix that is `distance_m` from where the localizer predicts the antenna.
-  std::optional<Start> find_restart(double distance_m) {
+  std::optional<Start> find_restart(double distance_m, bool is_contradicted = false) {
     const LocalFix at_antenna = fix();
     return supervisor.find_restart({at_antenna, history, antenna},
-                                   at_antenna.position + Eigen::Vector2d(0.0, distance_m), events);
+                                   at_antenna.position + Eigen::Vector2d(0.0, distance_m), is_contradicted, events);
   }
 };
 

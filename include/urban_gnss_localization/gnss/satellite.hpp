@@ -6,6 +6,7 @@
 #include <limits>
 #include <string>
 #include <tuple>
+#include <vector>
 
 namespace urban_gnss {
 
@@ -76,5 +77,8 @@ bool has_cn0(const SatelliteObservation& satellite);
 
 /// Whether there is a signal of it, with direction and C/N0.
 bool is_received(const SatelliteObservation& satellite);
+
+/// m, root mean square of the residuals of the satellites that were received; 0 where no residual is known.
+double residual_rms_m(const std::vector<SatelliteObservation>& satellites);
 
 }  // namespace urban_gnss

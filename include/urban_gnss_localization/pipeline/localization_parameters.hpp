@@ -4,6 +4,8 @@
 #include "urban_gnss_localization/gnss/datum_initializer.hpp"
 #include "urban_gnss_localization/pipeline/bias_matcher.hpp"
 #include "urban_gnss_localization/pipeline/input_parameters.hpp"
+#include "urban_gnss_localization/pipeline/integrity_monitor.hpp"
+#include "urban_gnss_localization/pipeline/speed_source.hpp"
 #include "urban_gnss_localization/pipeline/start_supervisor.hpp"
 #include "urban_gnss_localization/pipeline/status_reporter.hpp"
 #include "urban_gnss_localization/pipeline/velocity_queue.hpp"
@@ -27,9 +29,11 @@ struct LocalizationParameters {
   InputParameters input;
   StartParameters start;
   YawRateParameters imu;
+  SpeedParameters speed;
   VelocityParameters velocity;
   SatelliteParameters satellites;
   BiasMatcherParameters bias;
+  IntegrityParameters integrity;
   StatusParameters status;
 
   void visit(ParameterVisitor& v) {
@@ -37,9 +41,11 @@ struct LocalizationParameters {
     v.include(input);
     v.group("start", start, "Start and restart of the localizer.");
     v.group("imu", imu, "Yaw rate of the IMU.");
+    v.group("speed", speed, "Speed of the odometry, and when the receiver's takes its place.");
     v.group("velocity", velocity, "Velocity of the receiver.");
     v.group("satellites", satellites, "Satellites of a fix.");
     v.group("gps_bias", bias, "Bias of a fix, where the localizer takes it from a bias filter.");
+    v.group("integrity", integrity, "Long-run test of the estimate against the fixes.");
     v.group("status", status, "Criteria of the localizer's status.");
   }
 };

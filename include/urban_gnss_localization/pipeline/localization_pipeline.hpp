@@ -95,6 +95,8 @@ class LocalizationPipeline {
   bool initialized() const { return start_.has_started(); }
   const Localizer& localizer() const { return *localizer_; }
   Localizer& localizer() { return *localizer_; }
+  /// The pose as it is published: the localizer's, with a covariance that covers what fixes contradict it by.
+  PoseEstimate estimate() const;
   LocalizationReport report() const;
   /// One sentence for people; empty where nothing is waited for.
   std::string waiting_for() const;
@@ -114,6 +116,8 @@ class LocalizationPipeline {
   bool awaits_more(Stamp fix) const;
   void start_with(const ValidatedFix& fix);
   bool restart_with(const ValidatedFix& fix);
+  void compare_speed(const MatchedVelocity& velocity);
+  void watch_integrity(const ValidatedFix& fix, const Eigen::Vector2d& antenna_in_body);
   std::optional<BiasEstimate> take_bias(Stamp fix);
   void correct_with(const ValidatedFix& fix);
 
@@ -136,11 +140,13 @@ class LocalizationPipeline {
   OdometryHistory history_;
   std::size_t epoch_{0};
   YawRateSource yaw_rate_;
+  SpeedSource speed_;
   VelocityQueue velocities_;
   FixQueue fixes_;
   EpochMatcher satellites_;
   BiasMatcher biases_;
   StartSupervisor start_;
+  IntegrityMonitor integrity_;
   StatusReporter reporter_;
 
   std::vector<LocalizationOutput> outputs_;

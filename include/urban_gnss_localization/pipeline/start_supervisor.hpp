@@ -76,9 +76,9 @@ class StartSupervisor {
   /// Before the start: takes a fix into account. Returns the start that it makes possible.
   std::optional<Start> find_start(const StartFix& fix);
   /// After the start: takes a fix into account. Returns a new start where the last one had no heading and there is one
-  /// now, or where the place is lost and found again. `predicted`: of the antenna at the fix's stamp (m, map frame), by
-  /// the localizer.
-  std::optional<Start> find_restart(const StartFix& fix, const Eigen::Vector2d& predicted,
+  /// now, or where the place is lost, or fixes contradict the estimate for long, and the fixes and the motion agree
+  /// with each other. `predicted`: of the antenna at the fix's stamp (m, map frame), by the localizer.
+  std::optional<Start> find_restart(const StartFix& fix, const Eigen::Vector2d& predicted, bool is_contradicted,
                                     std::vector<PipelineEvent>& events);
 
   /// The localizer was started from `start`.

@@ -48,6 +48,9 @@ struct LocalizationReport {
   double fix_age_s{std::numeric_limits<double>::quiet_NaN()};
   double odometry_age_s{0.0};
   double position_sigma_m{std::numeric_limits<double>::quiet_NaN()};
+  double protection_level_m{std::numeric_limits<double>::quiet_NaN()};
+  double time_to_detect_s{std::numeric_limits<double>::quiet_NaN()};   ///< IntegrityMonitor
+  double time_to_recover_s{std::numeric_limits<double>::quiet_NaN()};  ///< IntegrityMonitor
   bool heading_converged{false};
   double bias_radius_m{0.0};
   LocalizerHealth health;
@@ -62,6 +65,11 @@ struct PipelineStatus {
   bool is_lost{false};
   std::string waiting_for;    ///< empty where it waits for nothing
   double bias_radius_m{0.0};  ///< of the last gps/bias
+  std::string complaint;      ///< of sources that contradict each other; empty where they do not
+  Eigen::Matrix2d contradiction_m2{
+      Eigen::Matrix2d::Zero()};  ///< that the published covariance has beside the localizer's
+  double time_to_detect_s{std::numeric_limits<double>::quiet_NaN()};
+  double time_to_recover_s{std::numeric_limits<double>::quiet_NaN()};
 };
 
 /// Counts what was decided, and says how a pipeline and its localizer are.

@@ -1,0 +1,75 @@
+#pragma once
+
+#include <deque>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "urban_gnss_localization/common/parameters.hpp"
+#include "urban_gnss_localization/motion/speed_check.hpp"
+#include "urban_gnss_localization/pipeline/pipeline_event.hpp"
+
+namespace urban_gnss {
+
+/// What is believed of the odometry's speed.
+struct SpeedParameters {
+  double max_acceleration{10.0};
+  bool check_wheels{true};
+
+  void visit(ParameterVisitor& v) {
+    v("max_acceleration", max_acceleration, positive(), "m/s^2",
+      "greatest acceleration that is believed; a speed beyond it is left out for up to 2 s");
+    v("check_wheels", check_wheels,
+      "whether the receiver's speed takes the place of one of the odometry that it shows to be wrong");
+  }
+};
+
+/// The speed at one time by the receiver's velocity.
+struct ReceiverSpeed {
+  Stamp stamp{0};
+  double speed_mps{0.0};                ///< >= 0
+  std::optional<double> forward_mps{};  ///< in the direction of the heading, where that is known
+  double sigma_mps{0.0};
+};
+
+/// Where the forward speed comes from: the odometry, until SpeedCheck finds it wrong; then the receiver's velocity,
+/// until both agree again. Where the receiver is silent it is the odometry's all the same, with the sign that was
+/// found.
+class SpeedSource {
+ public:
+  /// Requires parameters without faults.
+  explicit SpeedSource(const SpeedParameters& parameters) : parameters_(parameters) {}
+
+  /// Compares both speeds; stamps ascend.
+  void compare(const ReceiverSpeed& receiver, std::vector<PipelineEvent>& events);
+  /// The speed (m/s) of the step of `duration_s` that ends at `stamp`.
+  double speed_of(double odometry_mps, Stamp stamp, double duration_s, std::vector<PipelineEvent>& events);
+
+  /// Why the odometry's speed is not believed; empty where it is.
+  std::string complaint() const;
+  /// The estimate started anew: its heading has shown no sign yet.
+  void forget_heading() { has_agreed_ = false; }
+  void reset() { *this = SpeedSource(parameters_); }
+
+ private:
+  struct Speed {
+    Stamp stamp;
+    double mps;
+  };
+  /// By the odometry, whatever is believed of it; nothing outside of what is remembered.
+  std::optional<double> odometry_at(Stamp stamp) const;
+  /// Leaves out a speed that no acceleration explains, for up to 2 s.
+  double without_glitch(double odometry_mps, double duration_s, std::vector<PipelineEvent>& events);
+
+  SpeedParameters parameters_;
+  SpeedCheck check_;
+  std::deque<Speed> odometry_;             ///< of the last seconds
+  std::optional<double> last_mps_;         ///< of the odometry, that was believed
+  double held_s_{0.0};                     ///< for which a speed was left out
+  std::optional<double> before_jump_mps_;  ///< the speed before one that was believed after all
+  bool has_agreed_{false};                 ///< with the heading's sign, while it moved
+  SpeedPair shown_;                        ///< that showed the fault
+  SpeedPair pair_;                         ///< that was compared last
+};
+
+}  // namespace urban_gnss

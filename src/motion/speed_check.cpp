@@ -1,0 +1,103 @@
+#include "urban_gnss_localization/motion/speed_check.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "urban_gnss_localization/motion/standstill.hpp"
+
+namespace urban_gnss {
+namespace {
+
+constexpr double kTolerance_mps = 0.5;
+constexpr double kTolerance = 0.25;  ///< relative to the larger speed
+constexpr double kSigmas = 4.0;
+/// Both speeds are compared by their ratio beyond it.
+constexpr double kFast_mps = 1.0;
+/// By which the ratio of a scaled speed may change.
+constexpr double kSteadyRatio = 0.15;
+/// By which the receiver's speed may change while the wheels are dead.
+constexpr double kSteadySpeed = 2.0;
+/// A scale that is no error of tyres: miles and kilometres an hour, one wheel of two.
+constexpr double kGross = 1.8;
+constexpr double kSilence_s = 2.5;
+/// From a speed below it, a robot can turn back within kTurn_s.
+constexpr double kSlow_mps = 1.0;
+constexpr double kTurn_s = 3.0;
+
+/// For which a fault must last that begins with this pair.
+double least_time_s(SpeedFault fault, const SpeedPair& first) {
+  switch (fault) {
+    case SpeedFault::kNone: return 1.5;
+    case SpeedFault::kReversed: return 1.5;
+    case SpeedFault::kDead: return 4.0;
+    case SpeedFault::kScaled: {
+      const double scale = first.receiver_mps / first.odometry_mps;
+      return scale > kGross || scale < 1.0 / kGross ? 4.0 : 10.0;
+    }
+  }
+  return 0.0;
+}
+
+}  // namespace
+
+const char* to_string(SpeedFault fault) {
+  switch (fault) {
+    case SpeedFault::kNone: return "agrees";
+    case SpeedFault::kReversed: return "reversed";
+    case SpeedFault::kDead: return "dead";
+    case SpeedFault::kScaled: return "scaled";
+  }
+  return "?";
+}
+
+std::optional<SpeedFault> SpeedCheck::pattern_of(const SpeedPair& pair) const {
+  const double odometry = std::abs(pair.odometry_mps);
+  const double receiver = std::abs(pair.receiver_mps);
+  const double tolerance =
+      std::max({kTolerance_mps, kTolerance * std::max(odometry, receiver), kSigmas * pair.receiver_sigma_mps});
+  if (std::abs(pair.odometry_mps - pair.receiver_mps) <= tolerance) return SpeedFault::kNone;
+  if (odometry < kStandstillMean_mps) return SpeedFault::kDead;
+  if (std::abs(pair.odometry_mps + pair.receiver_mps) <= tolerance) {
+    const bool may_have_turned = turned_ && to_seconds(pair.stamp - *turned_) <= kTurn_s;
+    if (may_have_turned || run_ == SpeedFault::kReversed) return SpeedFault::kReversed;
+    return std::nullopt;
+  }
+  if (pair.odometry_mps * pair.receiver_mps <= 0.0 || odometry < kFast_mps || receiver < kFast_mps) return std::nullopt;
+  return SpeedFault::kScaled;
+}
+
+bool SpeedCheck::is_steady(const SpeedPair& pair) const {
+  switch (*run_) {
+    case SpeedFault::kNone:
+    case SpeedFault::kReversed: return true;
+    case SpeedFault::kDead: {
+      const double change = std::abs(pair.receiver_mps / first_->receiver_mps);
+      return change < kSteadySpeed && change > 1.0 / kSteadySpeed;
+    }
+    case SpeedFault::kScaled: {
+      const double ratio = pair.receiver_mps / pair.odometry_mps;
+      const double first = first_->receiver_mps / first_->odometry_mps;
+      return std::abs(ratio - first) <= kSteadyRatio * std::abs(first);
+    }
+  }
+  return false;
+}
+
+SpeedFault SpeedCheck::add(const SpeedPair& pair) {
+  // Where both stand, any wheels agree.
+  if (std::max(std::abs(pair.odometry_mps), std::abs(pair.receiver_mps)) < kTolerance_mps) return fault_;
+  const bool is_slow = std::abs(pair.odometry_mps) < kSlow_mps;
+  if (is_slow || (last_ && pair.odometry_mps * last_->odometry_mps < 0.0)) turned_ = pair.stamp;
+  const auto pattern = pattern_of(pair);
+  const bool goes_on =
+      pattern && pattern == run_ && to_seconds(pair.stamp - last_->stamp) <= kSilence_s && is_steady(pair);
+  if (!goes_on) {
+    first_ = pair;
+    run_ = pattern;
+  }
+  last_ = pair;
+  if (run_ && to_seconds(pair.stamp - first_->stamp) >= least_time_s(*run_, *first_)) fault_ = *run_;
+  return fault_;
+}
+
+}  // namespace urban_gnss
