@@ -12,6 +12,7 @@ The workspace must be sourced, or URBAN_GNSS_PROGRAMS be the folder of the built
 
 import argparse
 import concurrent.futures
+import json
 import math
 import os
 import re
@@ -45,9 +46,8 @@ ABLATIONS = {
     "ranges of the fix": ["expert.ranges.use_ranges=false"],
     "velocity of the receiver": ["expert.velocity.use_gps_velocity=false"],
     "heavy tails of the velocity": ["expert.velocity_noise.velocity_dof=1.0e+9"],
-    "correlation of errors": ["expert.fix_noise.fix_correlation_time=0.0",
-                              "expert.fix_noise.parked_correlation_time=0.0"],
-    "more of it when parked": ["expert.fix_noise.parked_correlation_time=3.0"],
+    "correlation of errors": ["expert.fix_noise.correlation_time=0.0", "expert.fix_noise.correlation_distance=0.0"],
+    "learnt quality of the odometry": ["expert.odometry_quality.wander_share=0.0"],
     "heavy tails": ["expert.bias.student_dof=1.0e+9"],
     "outliers": ["expert.bias.outlier_share=0.0"],
     "heavy tails, outliers": ["expert.bias.student_dof=1.0e+9", "expert.bias.outlier_share=0.0"],
@@ -62,9 +62,10 @@ SMALLEST_ERROR_M = 0.1
 
 
 class Scores:
-    """The errors of one method on one recording."""
+    """The errors of one method on one recording; `summary` is what replay says of them."""
 
-    def __init__(self, t, error):
+    def __init__(self, t, error, summary=None):
+        self.summary = summary or {}
         known = np.isfinite(error)
         self.t, self.error = np.asarray(t)[known], np.asarray(error)[known]
 
@@ -152,11 +153,23 @@ def run_recording(data, output, recording, methods, overrides):
     runs = []
     for method, arguments in methods.items():
         runs.append(os.path.join(folder, file_name(method) + ".bag"))
-        call(*program("replay"), bag, "--output", runs[-1], *arguments, *overrides)
+        call(*program("replay"), bag, "--output", runs[-1], "--json", summary_file(folder, method), *arguments,
+             *overrides)
     call(*program("evaluate"), *runs, bag, "--truth", bag, "--output", folder, "--no-plots")
     for run in runs:
         os.remove(run)
     return read_scores(folder, methods)
+
+
+def summary_file(folder, method):
+    """Where replay writes what it says of a run."""
+    return os.path.join(folder, file_name(method) + ".json")
+
+
+def read_summary(folder, method):
+    """The errors that replay found itself."""
+    with open(summary_file(folder, method), encoding="utf-8") as stream:
+        return json.load(stream).get("errors", {})
 
 
 def read_scores(folder, methods):
@@ -166,7 +179,7 @@ def read_scores(folder, methods):
         stem = file_name(method) + "_"
         errors = common.read_csv(os.path.join(folder, "data", "errors_" + stem + ESTIMATE.replace("/", "_") + ".csv"),
                                  ("t", "position_error_m", "est_x", "est_y", "truth_x", "truth_y"))
-        scores[method] = Scores(errors["t"], errors["position_error_m"])
+        scores[method] = Scores(errors["t"], errors["position_error_m"], read_summary(folder, method))
         tracks[method] = errors
     fixes = common.read_csv(os.path.join(folder, "data", "errors_recording_gps_fix.csv"),
                             ("t", "position_error_m", "est_x", "est_y"))
@@ -231,6 +244,22 @@ def table(results, methods):
     """Header and rows of the comparison."""
     header = ["recording"] + [RAW_FIX] + list(methods)
     rows = [[name] + [scores[method].cell() for method in header[1:]] for name, scores in results.items()]
+    return header, rows
+
+
+def honesty(results):
+    """Header and rows of how the covariance of the recommended localizer fits its errors."""
+    header = ["recording", "median / 95 % / max", "inside 95 %", "NEES / 2", "beyond protection"]
+    rows = []
+    for name, scores in results.items():
+        if ABLATED not in scores:
+            continue
+        found = scores[ABLATED].summary
+        values = [found.get(key) for key in ("inside_95", "position_nees_mean", "beyond_protection")]
+        if None in values:
+            continue
+        rows.append([name, scores[ABLATED].cell(), "{:.3f}".format(values[0]), "{:.2f}".format(values[1] / 2.0),
+                     "{:.2f} %".format(100.0 * values[2])])
     return header, rows
 
 
@@ -339,6 +368,7 @@ def write_report(options, methods, results, tracks):
     if options.docs:
         write_docs(options.docs, "ablation" if options.ablation else "comparison", markdown(header, rows))
         if not options.ablation:
+            write_docs(options.docs, "honesty", markdown(*honesty(results)))
             plot_overview(os.path.join(os.path.dirname(options.docs) or ".", "real_data.png"), results, methods)
     return os.path.join(options.output, "report.html")
 

@@ -33,11 +33,13 @@ for run in runs:
             file.write("%d,%d,0,%d,0,%d,0,1,1\\n" % (t, size, t + size, t))
 """
 REPLAY = """#!/usr/bin/env python3
-import sys
+import json, sys
 if "--list-variants" in sys.argv:
     print("ekf\\nswitching")
 else:
     open(sys.argv[sys.argv.index("--output") + 1], "w").close()
+    with open(sys.argv[sys.argv.index("--json") + 1], "w") as file:
+        json.dump({"errors": {"inside_95": 0.925, "position_nees_mean": 2.5, "beyond_protection": 0.001}}, file)
 """
 CSV_TO_BAG = """#!/usr/bin/env python3
 import sys
@@ -103,14 +105,16 @@ class ProgramTest(unittest.TestCase):
     def test_page_docs_and_figures(self):
         docs = os.path.join(self.directory, "real_data.md")
         with open(docs, "w") as file:
-            file.write("# Real\n<!-- comparison -->\n<!-- end of comparison -->\n")
-        done = self.run_script("--methods", "ekf", "switching", "--docs", docs)
+            file.write("# Real\n<!-- comparison -->\n<!-- end of comparison -->\n"
+                       "<!-- honesty -->\n<!-- end of honesty -->\n")
+        done = self.run_script("--methods", "ekf", "switching", "imm_ekf", "--docs", docs)
         self.assertEqual(done.returncode, 0, done.stderr)
         with open(os.path.join(self.directory, "out", "report.html"), encoding="utf-8") as file:
             page = file.read()
         with open(docs, encoding="utf-8") as file:
             table = file.read()
-        for text in ("`one`", "`two`", "3.0 / 3.0 / 3", "9.0 / 9.0 / 9", "7.0 / 7.0 / 7"):
+        for text in ("`one`", "`two`", "3.0 / 3.0 / 3", "9.0 / 9.0 / 9", "7.0 / 7.0 / 7",
+                     "| `two` | 7.0 / 7.0 / 7 | 0.925 | 1.25 | 0.10 % |"):
             self.assertIn(text, table)
         self.assertNotIn("no_truth", page + table)
         for picture in ("one.png", "two.png", "overview.png"):

@@ -142,6 +142,14 @@ class Repository(unittest.TestCase):
             if not name.startswith("..") and name != "index.md":
                 self.assertIn("(" + name.replace(os.sep, "/") + ")", index)
 
+    def test_scripts_that_pages_call_are_programs(self):
+        named = set()
+        for page in pages(ROOT):
+            named.update(re.findall(r"rosrun urban_gnss_localization (\w+\.py)", read_text(page)))
+        self.assertIn("compare_localizers.py", named)
+        for name in named:
+            self.assertTrue(os.access(os.path.join(ROOT, "reports", name), os.X_OK), name)
+
     def test_comments_name_pages_that_exist(self):
         for top in ("src", "include", "launch", "config", "reports", "scripts", "dev"):
             for folder, _, names in os.walk(os.path.join(ROOT, top)):
