@@ -22,7 +22,7 @@ constexpr double kCauchyTuning = 2.3849;    // 95 % efficiency where the noise i
 constexpr double kRayleighMedian = 1.1774;  // median length of a 2-D vector with unit variance per axis
 constexpr double kMaxNumber = 1e8;          // in m farther than round the Earth; squares stay finite
 constexpr double kRigidShare = 0.7;         // of the fixes in the window
-constexpr double kRigidFactor = 1.5;        // of the declared standard deviation
+constexpr double kGoodFactor = 1.5;         // of the declared standard deviation
 constexpr double kAgreement = 9.2103;       // chi-square quantile, 99 %, 2 degrees of freedom
 
 double upper_median(std::vector<double> values) {
@@ -152,7 +152,12 @@ std::optional<PoseEstimate> HeadingInitializer::estimate() const {
 
 bool HeadingInitializer::is_rigid() const {
   const auto found = consensus();
-  return found && found->agreeing >= kRigidShare && found->noise_sigma <= kRigidFactor * found->declared_sigma;
+  return found && found->agreeing >= kRigidShare;
+}
+
+bool HeadingInitializer::is_good() const {
+  const auto found = consensus();
+  return found && found->agreeing >= kRigidShare && found->noise_sigma <= kGoodFactor * found->declared_sigma;
 }
 
 PoseEstimate HeadingInitializer::without_heading() const {

@@ -12,9 +12,10 @@ constexpr double kTolerance_mps = 0.5;
 constexpr double kTolerance = 0.25;  ///< relative to the larger speed
 constexpr double kSigmas = 4.0;
 /// Both speeds are compared by their ratio beyond it.
-constexpr double kFast_mps = 1.0;
+constexpr double kLeast_mps = 0.3;
 /// By which the ratio of a scaled speed may change.
 constexpr double kSteadyRatio = 0.15;
+constexpr double kSteadySigmas = 2.0;
 /// By which the receiver's speed may change while the wheels are dead.
 constexpr double kSteadySpeed = 2.0;
 /// A scale that is no error of tyres: miles and kilometres an hour, one wheel of two.
@@ -62,7 +63,9 @@ std::optional<SpeedFault> SpeedCheck::pattern_of(const SpeedPair& pair) const {
     if (may_have_turned || run_ == SpeedFault::kReversed) return SpeedFault::kReversed;
     return std::nullopt;
   }
-  if (pair.odometry_mps * pair.receiver_mps <= 0.0 || odometry < kFast_mps || receiver < kFast_mps) return std::nullopt;
+  if (pair.odometry_mps * pair.receiver_mps <= 0.0 || odometry < kLeast_mps || receiver < kLeast_mps) {
+    return std::nullopt;
+  }
   return SpeedFault::kScaled;
 }
 
@@ -75,9 +78,9 @@ bool SpeedCheck::is_steady(const SpeedPair& pair) const {
       return change < kSteadySpeed && change > 1.0 / kSteadySpeed;
     }
     case SpeedFault::kScaled: {
-      const double ratio = pair.receiver_mps / pair.odometry_mps;
-      const double first = first_->receiver_mps / first_->odometry_mps;
-      return std::abs(ratio - first) <= kSteadyRatio * std::abs(first);
+      const double scaled_mps = first_->receiver_mps / first_->odometry_mps * pair.odometry_mps;
+      const double noise_mps = kSteadySigmas * std::hypot(pair.receiver_sigma_mps, first_->receiver_sigma_mps);
+      return std::abs(pair.receiver_mps - scaled_mps) <= std::max(kSteadyRatio * std::abs(scaled_mps), noise_mps);
     }
   }
   return false;

@@ -157,7 +157,6 @@ void LocalizationPipeline::compare_speed(const MatchedVelocity& velocity) {
 }
 
 void LocalizationPipeline::add_satellites(Stamp stamp, std::vector<SatelliteObservation> satellites) {
-  if (!takes_satellites()) return;
   satellites_.add({stamp, std::move(satellites)});
   process_fixes();
 }
@@ -226,7 +225,8 @@ bool LocalizationPipeline::process_next_fix() {
 
 bool LocalizationPipeline::awaits_more(Stamp fix) const {
   const double waited_s = to_seconds(history_.latest() - fix);
-  return (satellites_.awaits(fix) && waited_s < parameters_.satellites.satellites_wait) ||
+  return (localizer_->takes_satellites() && satellites_.awaits(fix) &&
+          waited_s < parameters_.satellites.satellites_wait) ||
          (localizer_->wants_bias() && biases_.awaits(fix, waited_s));
 }
 
@@ -265,11 +265,11 @@ void LocalizationPipeline::correct_with(const ValidatedFix& fix) {
   measurement.bias_radius_m = biases_.radius_m();
   measurement.time_s = to_seconds(stamp);
   measurement.stamp = stamp;
-  if (const SatelliteEpoch* epoch = satellites_.take(stamp)) measurement.satellites = epoch->satellites;
+  const SatelliteEpoch* epoch = satellites_.take(stamp);
+  if (epoch != nullptr && localizer_->takes_satellites()) measurement.satellites = epoch->satellites;
 
-  if (residual_rms_m(measurement.satellites) <= parameters_.integrity.residual_limit) {
-    watch_integrity(fix, measurement.antenna_in_body);
-  }
+  const bool is_spoilt = epoch != nullptr && residual_rms_m(epoch->satellites) > parameters_.integrity.residual_limit;
+  if (!is_spoilt) watch_integrity(fix, measurement.antenna_in_body);
   FixOutcome outcome = localizer_->correct(measurement);
   outcome.stamp = stamp;
   outcome.covariance_clamped = fix.outcome.covariance_clamped;

@@ -66,8 +66,9 @@ std::optional<Start> StartSupervisor::find_restart(const StartFix& fix, const Ei
     start->fix_use = "used for a start with heading";
     return start;
   }
-  const bool is_wrong = is_lost_by(fix.fix, predicted, events) || is_contradicted;
-  if (is_wrong && is_remembered && heading_.is_rigid()) start = from_motion(fix);
+  const bool is_lost = is_lost_by(fix.fix, predicted, events);
+  const bool can_start = (is_lost && heading_.is_rigid()) || (is_contradicted && heading_.is_good());
+  if (can_start && is_remembered) start = from_motion(fix);
   if (start) start->fix_use = "used for a new start";
   return start;
 }

@@ -39,9 +39,7 @@ LocalizerNode::LocalizerNode(ros::NodeHandle& node, ros::NodeHandle& private_nod
   if (pipeline_.takes_velocity()) {
     subscribers_.push_back(node.subscribe(topics::kVelocity, 100, &Self::on_velocity, this, kNoDelay));
   }
-  if (pipeline_.takes_satellites()) {
-    subscribers_.push_back(node.subscribe(topics::kSatellites, 100, &Self::on_satellites, this, kNoDelay));
-  }
+  subscribers_.push_back(node.subscribe(topics::kSatellites, 100, &Self::on_satellites, this, kNoDelay));
   if (parameters_.localization.imu.use_imu_yaw_rate) {
     subscribers_.push_back(node.subscribe(topics::kImu, 1000, &Self::on_imu, this, kNoDelay));
   }

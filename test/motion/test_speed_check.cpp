@@ -82,7 +82,7 @@ TEST(SpeedCheck, ReflectionOfChangingSizeIsNoFault) {
 }
 
 TEST(SpeedCheck, SlowWheelsOfAFastRobotHaveNoPattern) {
-  EXPECT_EQ(Pairs().add_for(60.0, 0.5, 5.0), SpeedFault::kNone);
+  EXPECT_EQ(Pairs().add_for(60.0, 0.2, 5.0), SpeedFault::kNone);
   EXPECT_EQ(Pairs().add_for(60.0, 5.0, -1.0), SpeedFault::kNone);
 }
 
@@ -112,7 +112,7 @@ TEST(SpeedCheck, NoRobotTurnsBackAtSpeed) {
 TEST(SpeedCheck, DifferenceWithoutAPatternEndsNothing) {
   Pairs pairs;
   ASSERT_EQ(pairs.add_for(4.0, 0.0, 3.0), SpeedFault::kDead);
-  EXPECT_EQ(pairs.add_for(60.0, 0.5, 5.0), SpeedFault::kDead);
+  EXPECT_EQ(pairs.add_for(60.0, 0.2, 5.0), SpeedFault::kDead);
 }
 
 TEST(SpeedCheck, GapInThePatternStartsAnew) {

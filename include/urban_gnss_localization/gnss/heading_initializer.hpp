@@ -83,9 +83,10 @@ class HeadingInitializer {
   /// jitter of a parked robot's odometry adds up to a long path).
   std::optional<PoseEstimate> estimate() const;
 
-  /// Whether most fixes of the window agree with the odometry as well as their covariances say: then they are good, and
-  /// an estimate far from them is wrong. Reflections bend the path of the fixes.
+  /// Whether most fixes of the window agree with each other and the odometry. Reflections bend the path of the fixes.
   bool is_rigid() const;
+  /// And as well as their covariances say: then they are good, and an estimate far from them is wrong.
+  bool is_good() const;
 
   /// A start without a heading: the position at the last fix, yaw 0 with the variance of a uniform one (pi²/3). The
   /// position is that of the latest fix that agrees with the others, and its covariance is enlarged by the way

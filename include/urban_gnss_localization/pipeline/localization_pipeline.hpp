@@ -59,10 +59,9 @@ class LocalizationPipeline {
   /// A velocity of the receiver. It waits for the odometry of its stamp, tells the heading from which to start, and is
   /// taken by the localizer. One that cannot be used is left out, with an event that says why.
   void add_velocity(const RawVelocity& velocity);
-  /// Whether satellites change anything.
-  bool takes_satellites() const { return localizer_->takes_satellites(); }
   /// The satellites of the fix at `stamp`, before or after it. Once satellites have come to a fix, the next waits for
-  /// its own, by satellites_wait at the most.
+  /// its own, by satellites_wait at the most, if the localizer makes use of them. Whatever the localizer, they tell
+  /// whether a fix is spoilt (IntegrityMonitor).
   void add_satellites(Stamp stamp, std::vector<SatelliteObservation> satellites);
   /// The bias at a fix, where the localizer wants one.
   void add_bias(const BiasEstimate& bias);
