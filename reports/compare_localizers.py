@@ -233,7 +233,7 @@ def plot_overview(path, results, methods):
     axes.set_yscale("log")
     common.plain_ticks(axes.yaxis)
     axes.set_xticks(np.arange(len(results)))
-    axes.set_xticklabels([name.replace("_", "\n", 1) for name in results], rotation=20, fontsize=7)
+    axes.set_xticklabels([name.replace("_", "\n", 1) for name in results], rotation=35, ha="right", fontsize=7)
     axes.set_ylabel("position error [m], median to 95 %")
     common.light_grid(axes)
     common.legend_beside(axes)
