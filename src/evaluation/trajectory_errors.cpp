@@ -62,7 +62,7 @@ ErrorSummary summarize_errors(const std::vector<ErrorSample>& samples, double co
     if (std::isfinite(sample.nees)) nees.push_back(sample.nees);
     if (!std::isfinite(sample.position_nees)) continue;
     position_nees.push_back(sample.position_nees);
-    if (sample.position_nees < kWithin95) ++inside;
+    if (is_inside_95(sample)) ++inside;
     if (sample.position_error_m > protection_level_m(sample.position_sigma_m)) ++beyond;
   }
   const auto share_below = [&](double limit_m) {
@@ -90,6 +90,8 @@ bool has_pose_within(const Trajectory& trajectory, Stamp stamp, Stamp distance) 
 }
 
 }  // namespace
+
+bool is_inside_95(const ErrorSample& sample) { return sample.position_nees <= kWithin95; }
 
 TrajectoryErrors errors_at_truth(const Trajectory& truth, const Trajectory& estimate, Stamp max_gap) {
   TrajectoryErrors errors;

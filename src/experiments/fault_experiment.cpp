@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "urban_gnss_localization/gnss/chi_squared.hpp"
-
 namespace urban_gnss {
 namespace {
 
@@ -28,7 +26,6 @@ bool is_healthy(const std::vector<HealthSample>& health, Stamp stamp) {
 
 std::vector<Moment> moments_since(Stamp onset, const Trajectory& truth, const Trajectory& estimate,
                                   const std::vector<HealthSample>& health) {
-  const double within_95 = chi_squared_quantile(0.95, 2);
   const std::vector<ErrorSample> errors = errors_at_truth(truth, estimate).samples;
   auto error = errors.begin();
   std::vector<Moment> moments;
@@ -39,7 +36,7 @@ std::vector<Moment> moments_since(Stamp onset, const Trajectory& truth, const Tr
       moment.stamp = pose.stamp;
       moment.healthy = is_healthy(health, pose.stamp);
       if (has_estimate) moment.error_m = error->position_error_m;
-      if (has_estimate) moment.is_inside_95 = error->position_nees <= within_95;
+      if (has_estimate) moment.is_inside_95 = is_inside_95(*error);
     }
     if (has_estimate) ++error;
   }

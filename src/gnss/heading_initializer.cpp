@@ -7,6 +7,7 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "urban_gnss_localization/common/median.hpp"
 #include "urban_gnss_localization/gnss/correlated_errors.hpp"
 
 namespace urban_gnss {
@@ -24,12 +25,6 @@ constexpr double kMaxNumber = 1e8;          // in m farther than round the Earth
 constexpr double kRigidShare = 0.7;         // of the fixes in the window
 constexpr double kGoodFactor = 1.5;         // of the declared standard deviation
 constexpr double kAgreement = 9.2103;       // chi-square quantile, 99 %, 2 degrees of freedom
-
-double upper_median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 /// Observations of one kind, on the way to those that agree with each other.
 struct Observations {

@@ -18,6 +18,14 @@ std::array<OdometryErrorParameters, kQualityLevels> quality_levels(const Odometr
   return levels;
 }
 
+std::array<MotionStep, kQualityLevels> make_motion_steps(
+    const Twist2& twist, double duration_s, const MotionParameters& motion,
+    const std::array<OdometryErrorParameters, kQualityLevels>& levels) {
+  std::array<MotionStep, kQualityLevels> steps;
+  for (std::size_t i = 0; i < kQualityLevels; ++i) steps[i] = make_motion_step(twist, duration_s, motion, levels[i]);
+  return steps;
+}
+
 QualityProbabilities prior_quality(const OdometryQualityParameters& p) {
   QualityProbabilities prior = QualityProbabilities::Constant(p.wander_share / (kQualityLevels - 1));
   prior[0] = 1.0 - p.wander_share;
@@ -28,6 +36,14 @@ QualityTransition quality_transition(double elapsed_s, const OdometryQualityPara
   const double stays = std::exp(-elapsed_s / p.quality_time);
   const QualityTransition drawn = QualityProbabilities::Ones() * prior_quality(p).transpose();
   return stays * QualityTransition::Identity() + (1.0 - stays) * drawn;
+}
+
+QualityProbabilities rescaling(const QualityProbabilities& present, const QualityProbabilities& target) {
+  QualityProbabilities factors = QualityProbabilities::Ones();
+  for (int i = 0; i < factors.size(); ++i) {
+    if (present[i] > 0.0) factors[i] = target[i] / present[i];
+  }
+  return factors;
 }
 
 QualityProbabilities bounded_quality(const QualityProbabilities& before, const QualityProbabilities& after,

@@ -7,18 +7,14 @@
 #include <utility>
 #include <vector>
 
+#include "urban_gnss_localization/common/median.hpp"
+
 namespace urban_gnss {
 namespace {
 
 constexpr std::size_t kLeastFixes = 3;
 /// A contradiction ends where the offset is below this share of what begins one.
 constexpr double kEnd = 2.0 / 3.0;
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 Eigen::Vector2d median_offset(const std::deque<FixMisfit>& fixes) {
   std::vector<double> east;
@@ -27,7 +23,7 @@ Eigen::Vector2d median_offset(const std::deque<FixMisfit>& fixes) {
     east.push_back(each.offset.x());
     north.push_back(each.offset.y());
   }
-  return {median(std::move(east)), median(std::move(north))};
+  return {upper_median(std::move(east)), upper_median(std::move(north))};
 }
 
 Eigen::Matrix2d claim_of(const FixMisfit& fix) { return fix.fix_covariance + fix.estimate_covariance; }

@@ -67,8 +67,8 @@ std::optional<Start> StartSupervisor::find_restart(const StartFix& fix, const Ei
     return start;
   }
   const bool is_lost = is_lost_by(fix.fix, predicted, events);
-  const bool can_start = (is_lost && heading_.is_rigid()) || (is_contradicted && heading_.is_good());
-  if (can_start && is_remembered) start = from_motion(fix);
+  if (!is_remembered) return std::nullopt;
+  if ((is_lost && heading_.is_rigid()) || (is_contradicted && heading_.is_good())) start = from_motion(fix);
   if (start) start->fix_use = "used for a new start";
   return start;
 }

@@ -26,6 +26,9 @@ struct ErrorSample {
   double position_nees{std::numeric_limits<double>::quiet_NaN()};  ///< the same of x, y (2 degrees of freedom)
 };
 
+/// Whether the truth lies inside the 95 % ellipse of the estimate's position; not where that is unknown.
+bool is_inside_95(const ErrorSample& sample);
+
 /// Error samples in a few numbers; NaN where there is nothing to average.
 struct ErrorSummary {
   std::size_t samples{0};

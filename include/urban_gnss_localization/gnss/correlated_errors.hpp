@@ -26,4 +26,7 @@ struct ErrorCorrelation {
   double inflation(double moved_m, double interval_s) const;
 };
 
+/// What is taken of fixes where nothing else is said.
+inline constexpr ErrorCorrelation kFixErrors{15.0, 40.0};
+
 }  // namespace urban_gnss

@@ -19,7 +19,7 @@ struct HeadingInitializerParameters {
   double initialization_timeout{60.0};
   double initialization_window{60.0};
   double initialization_heading_walk{0.01};
-  ErrorCorrelation fix_errors{15.0, 40.0};
+  ErrorCorrelation fix_errors{kFixErrors};
 
   void visit(ParameterVisitor& v) {
     v("initialization_heading_sigma", initialization_heading_sigma, open_between(0.0, 1.0), "rad",

@@ -38,10 +38,18 @@ using QualityTransition = Eigen::Matrix<double, kQualityLevels, kQualityLevels>;
 std::array<OdometryErrorParameters, kQualityLevels> quality_levels(const OdometryErrorParameters& best,
                                                                    const OdometryQualityParameters& parameters);
 
+/// One step of the odometry with the noise of each level.
+std::array<MotionStep, kQualityLevels> make_motion_steps(
+    const Twist2& twist, double duration_s, const MotionParameters& motion,
+    const std::array<OdometryErrorParameters, kQualityLevels>& levels);
+
 QualityProbabilities prior_quality(const OdometryQualityParameters& parameters);
 
 /// After `elapsed_s` >= 0, in which the level may have been drawn anew from prior_quality().
 QualityTransition quality_transition(double elapsed_s, const OdometryQualityParameters& parameters);
+
+/// By which to multiply what has the probabilities `present`, so that it has `target`; 1 where there is nothing.
+QualityProbabilities rescaling(const QualityProbabilities& present, const QualityProbabilities& target);
 
 /// The probabilities that a fix leaves, by those `before` and `after` it by Bayes' rule, where no fix may say more than
 /// quality_evidence: errors of fixes last, and one that is off is no proof of a bad odometry.

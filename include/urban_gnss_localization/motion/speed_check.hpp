@@ -37,11 +37,10 @@ class SpeedCheck {
  private:
   /// What one pair shows; nothing where it shows a difference without a pattern.
   std::optional<SpeedFault> pattern_of(const SpeedPair& pair) const;
-
-  SpeedFault fault_{SpeedFault::kNone};
   /// Whether the pair goes on as the run of its pattern did.
   bool is_steady(const SpeedPair& pair) const;
 
+  SpeedFault fault_{SpeedFault::kNone};
   std::optional<SpeedPair> first_;  ///< of the run of pairs of one pattern
   std::optional<SpeedPair> last_;   ///< of all pairs
   std::optional<Stamp> turned_;     ///< when the robot may have begun to move the other way

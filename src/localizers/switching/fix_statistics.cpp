@@ -35,21 +35,19 @@ void FixStatistics::reset() {
   velocity_scale_ = parameters_.velocity.fresh_scale();
   last_fix_s_.reset();
   last_velocity_s_.reset();
-  moved_s_ = 0.0;
-  way_m_ = 0.0;
+  travel_ = {};
   corrections_.setZero();
   common_variance_m2_ = 0.0;
 }
 
 void FixStatistics::move(const Twist2& twist, double duration_s) {
-  moved_s_ += duration_s;
-  way_m_ += std::abs(twist.speed_mps) * duration_s;
+  travel_.add(twist, duration_s);
   noise_.move(twist, duration_s);
   range_noise_.move(twist, duration_s);
 }
 
 double FixStatistics::elapsed_s(double time_s) const {
-  return last_fix_s_ ? std::max(time_s - *last_fix_s_, 0.0) : moved_s_;
+  return last_fix_s_ ? std::max(time_s - *last_fix_s_, 0.0) : travel_.duration_s;
 }
 
 double FixStatistics::range_sigma_m() const {
@@ -100,10 +98,10 @@ void FixStatistics::compare_with_odometry(const FixMeasurement& fix, const BiasG
   beside.misfit = fix.position - beside.place;
   beside.covariance =
       of_ranges_ ? Eigen::Matrix2d(fix.covariance / noise.scale()) : parameters_.fix.direct_covariance(fix.covariance);
-  beside.walk_m2 = walk * walk * moved_s_;
+  beside.walk_m2 = walk * walk * travel_.duration_s;
   beside.heading_sigma_rad = std::sqrt(before.covariance(kYaw, kYaw));
   beside.time_s = fix.time_s;
-  beside.way_m = way_m_;
+  beside.way_m = travel_.distance_m;
   noise.compare(beside);
   corrections_ += after.mean.head<2>() - before.mean.head<2>();
   const double declared_m2 = 0.5 * beside.covariance.trace();

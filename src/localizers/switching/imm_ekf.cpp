@@ -47,9 +47,9 @@ void ImmEkf::initialize(const PoseEstimate& start) {
 void ImmEkf::move(const Twist2& twist, double duration_s) {
   if (!is_usable(twist, duration_s)) return;
   statistics_.move(twist, duration_s);
+  const std::array<MotionStep, kQualityLevels> steps = make_motion_steps(twist, duration_s, motion_, levels_);
   for (std::size_t i = 0; i < kFilters; ++i) {
-    const OdometryErrorParameters& errors = levels_[i / kLastingModes];
-    predict(filters_[i], make_motion_step(twist, duration_s, motion_, errors), errors);
+    predict(filters_[i], steps[i / kLastingModes], levels_[i / kLastingModes]);
   }
 }
 
@@ -59,6 +59,7 @@ ImmEkf::Branches ImmEkf::branch(const FixMeasurement& fix) const {
   const ModeTransition transition = mode_transition(elapsed_s, parameters_.modes, statistics_.bias_odds());
   const QualityTransition quality = quality_transition(elapsed_s, parameters_.quality);
   Branches branches;
+  branches.expected_quality = quality.transpose() * quality_probabilities();
   double largest = -std::numeric_limits<double>::infinity();
   bool is_finite = true;
   for (std::size_t j = 0; j < kContinuations; ++j) {
@@ -140,12 +141,9 @@ FixOutcome ImmEkf::correct(const FixMeasurement& declared) {
     any_outlier += branches.probability[j] * branches.updates[j].outlier;
     if (branches.updates[j].white_nis > LearntScale::kMedianNis) exceeding += branches.probability[j];
   }
-  const double elapsed_s = statistics_.elapsed_s(fix.time_s);
   statistics_.learn_fix(fix.time_s, exceeding);
-  const QualityProbabilities expected =
-      quality_transition(elapsed_s, parameters_.quality).transpose() * quality_probabilities();
   merge(branches);
-  set_quality(bounded_quality(expected, quality_probabilities(), parameters_.quality));
+  set_quality(bounded_quality(branches.expected_quality, quality_probabilities(), parameters_.quality));
   statistics_.compare_with_odometry(fix, before, mixture());
 
   outcome.decision = mode_probabilities()[0] >= 0.5 ? FixDecision::kAccepted : FixDecision::kBiasCompensated;
@@ -200,11 +198,8 @@ ModeProbabilities ImmEkf::mode_probabilities() const {
 }
 
 void ImmEkf::set_quality(const QualityProbabilities& target) {
-  const QualityProbabilities present = quality_probabilities();
-  for (std::size_t i = 0; i < kFilters; ++i) {
-    const auto level = static_cast<int>(i / kLastingModes);
-    if (present[level] > 0.0) probability_[i] *= target[level] / present[level];
-  }
+  const QualityProbabilities factors = rescaling(quality_probabilities(), target);
+  for (std::size_t i = 0; i < kFilters; ++i) probability_[i] *= factors[static_cast<int>(i / kLastingModes)];
 }
 
 QualityProbabilities ImmEkf::quality_probabilities() const {

@@ -71,13 +71,9 @@ QualityProbabilities quality_of(const std::vector<BiasHypothesis>& hypotheses) {
 
 /// Weighs those of each quality so that they sum to `target`.
 void set_quality(const QualityProbabilities& target, std::vector<BiasHypothesis>& hypotheses) {
-  const QualityProbabilities present = quality_of(hypotheses);
+  const QualityProbabilities factors = rescaling(quality_of(hypotheses), target);
   double sum = 0.0;
-  for (BiasHypothesis& each : hypotheses) {
-    const auto level = static_cast<int>(each.quality);
-    if (present[level] > 0.0) each.weight *= target[level] / present[level];
-    sum += each.weight;
-  }
+  for (BiasHypothesis& each : hypotheses) sum += each.weight *= factors[static_cast<int>(each.quality)];
   for (BiasHypothesis& each : hypotheses) each.weight /= sum;  // a quality may have died out
 }
 
@@ -119,8 +115,7 @@ void SwitchingParticleFilter::initialize(const PoseEstimate& start) {
 void SwitchingParticleFilter::move(const Twist2& twist, double duration_s) {
   if (!is_usable(twist, duration_s)) return;
   statistics_.move(twist, duration_s);
-  std::array<MotionStep, kQualityLevels> steps;
-  for (std::size_t i = 0; i < kQualityLevels; ++i) steps[i] = make_motion_step(twist, duration_s, motion_, levels_[i]);
+  const std::array<MotionStep, kQualityLevels> steps = make_motion_steps(twist, duration_s, motion_, levels_);
   for (BiasHypothesis& each : hypotheses_) predict(each.state, steps[each.quality], levels_[each.quality]);
   update_estimate();
 }

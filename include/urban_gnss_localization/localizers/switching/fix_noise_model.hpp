@@ -18,7 +18,7 @@ struct FixNoiseModelParameters {
   double first_fix_scale{2.0};
   double fix_covariance_weight{0.5};
   double fix_scale_limit{15.0};
-  ErrorCorrelation errors{15.0, 40.0};
+  ErrorCorrelation errors{kFixErrors};
   double fix_scale_lag{15.0};
   double fix_scale_distance{30.0};
 

@@ -8,6 +8,7 @@
 #include "urban_gnss_localization/localizers/switching/bias_ekf.hpp"
 #include "urban_gnss_localization/localizers/switching/fix_noise_model.hpp"
 #include "urban_gnss_localization/localizers/switching/learnt_scale.hpp"
+#include "urban_gnss_localization/motion/standstill.hpp"
 
 namespace urban_gnss {
 
@@ -67,8 +68,7 @@ class FixStatistics {
   LearntScale velocity_scale_;
   std::optional<double> last_fix_s_;
   std::optional<double> last_velocity_s_;
-  double way_m_{0.0};                                     ///< of odometry since the start
-  double moved_s_{0.0};                                   ///< of odometry since the start
+  Travel travel_;                                         ///< of odometry since the start
   Eigen::Vector2d corrections_{Eigen::Vector2d::Zero()};  ///< m, what fixes and velocities have moved the position by
   double common_variance_m2_{0.0};
 };

@@ -59,6 +59,7 @@ class ImmEkf : public Localizer {
     std::array<Gaussian, kBranches> filters;
     std::array<BiasEkfUpdate, kBranches> updates;
     std::array<double, kBranches> probability{};  ///< posterior
+    QualityProbabilities expected_quality;        ///< before the fix
     bool are_finite{false};
   };
   Branches branch(const FixMeasurement& fix) const;
