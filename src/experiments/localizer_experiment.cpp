@@ -41,8 +41,10 @@ class Participant : public LocalizingParticipant {
   void add_odometry(const OdometrySample& sample) override {
     localization_.add_odometry(sample);
     settle();
-    if (!health_.empty() && sample.stamp - health_.back().stamp < kHealthInterval) return;
-    health_.push_back({sample.stamp, localization_.report().healthy});
+    const bool healthy = localization_.report().healthy;
+    const bool is_known = !health_.empty() && health_.back().healthy == healthy;
+    if (is_known && sample.stamp - health_.back().stamp < kHealthInterval) return;
+    health_.push_back({sample.stamp, healthy});
   }
 
   void add_cloud(Stamp stamp, const PointCloud& cloud, const Eigen::Isometry3d& sensor_in_base,

@@ -9,13 +9,16 @@ namespace urban_gnss {
 namespace {
 
 constexpr double kTolerance_mps = 0.5;
+/// Where both move, the receiver's sigma tells more.
+constexpr double kMovingTolerance_mps = 0.25;
 constexpr double kTolerance = 0.25;  ///< relative to the larger speed
 constexpr double kSigmas = 4.0;
 /// Both speeds are compared by their ratio beyond it.
 constexpr double kLeast_mps = 0.3;
-/// By which the ratio of a scaled speed may change.
-constexpr double kSteadyRatio = 0.15;
-constexpr double kSteadySigmas = 2.0;
+/// By which the ratio of a scaled speed may change, and how quickly its mean follows.
+constexpr double kSteadyRatio = 0.3;
+constexpr double kSteadySigmas = 3.0;
+constexpr double kRatioRate = 0.2;
 /// By which the receiver's speed may change while the wheels are dead.
 constexpr double kSteadySpeed = 2.0;
 /// A scale that is no error of tyres: miles and kilometres an hour, one wheel of two.
@@ -25,15 +28,15 @@ constexpr double kSilence_s = 2.5;
 constexpr double kSlow_mps = 1.0;
 constexpr double kTurn_s = 3.0;
 
-/// For which a fault must last that begins with this pair.
-double least_time_s(SpeedFault fault, const SpeedPair& first) {
+/// For which a fault must last; `ratio` of the receiver's speed to the odometry's.
+double least_time_s(SpeedFault fault, double ratio, bool odometry_jumped) {
   switch (fault) {
     case SpeedFault::kNone: return 1.5;
     case SpeedFault::kReversed: return 1.5;
     case SpeedFault::kDead: return 4.0;
     case SpeedFault::kScaled: {
-      const double scale = first.receiver_mps / first.odometry_mps;
-      return scale > kGross || scale < 1.0 / kGross ? 4.0 : 10.0;
+      const bool is_gross = ratio > kGross || ratio < 1.0 / kGross;
+      return (is_gross ? 4.0 : 10.0) * (odometry_jumped ? 0.5 : 1.0);
     }
   }
   return 0.0;
@@ -54,8 +57,9 @@ const char* to_string(SpeedFault fault) {
 std::optional<SpeedFault> SpeedCheck::pattern_of(const SpeedPair& pair) const {
   const double odometry = std::abs(pair.odometry_mps);
   const double receiver = std::abs(pair.receiver_mps);
+  const double least = std::min(odometry, receiver) < kLeast_mps ? kTolerance_mps : kMovingTolerance_mps;
   const double tolerance =
-      std::max({kTolerance_mps, kTolerance * std::max(odometry, receiver), kSigmas * pair.receiver_sigma_mps});
+      std::max({least, kTolerance * std::max(odometry, receiver), kSigmas * pair.receiver_sigma_mps});
   if (std::abs(pair.odometry_mps - pair.receiver_mps) <= tolerance) return SpeedFault::kNone;
   if (odometry < kStandstillMean_mps) return SpeedFault::kDead;
   if (std::abs(pair.odometry_mps + pair.receiver_mps) <= tolerance) {
@@ -78,12 +82,18 @@ bool SpeedCheck::is_steady(const SpeedPair& pair) const {
       return change < kSteadySpeed && change > 1.0 / kSteadySpeed;
     }
     case SpeedFault::kScaled: {
-      const double scaled_mps = first_->receiver_mps / first_->odometry_mps * pair.odometry_mps;
-      const double noise_mps = kSteadySigmas * std::hypot(pair.receiver_sigma_mps, first_->receiver_sigma_mps);
-      return std::abs(pair.receiver_mps - scaled_mps) <= std::max(kSteadyRatio * std::abs(scaled_mps), noise_mps);
+      const double scaled_mps = ratio_ * pair.odometry_mps;
+      return std::abs(pair.receiver_mps - scaled_mps) <=
+             std::max(kSteadyRatio * std::abs(scaled_mps), kSteadySigmas * pair.receiver_sigma_mps);
     }
   }
   return false;
+}
+
+double SpeedCheck::run_s() const { return first_ && last_ ? to_seconds(last_->stamp - first_->stamp) : 0.0; }
+
+double SpeedCheck::suspected_for_s() const {
+  return run_ && *run_ != SpeedFault::kNone && *run_ != fault_ ? run_s() : 0.0;
 }
 
 SpeedFault SpeedCheck::add(const SpeedPair& pair) {
@@ -95,11 +105,17 @@ SpeedFault SpeedCheck::add(const SpeedPair& pair) {
   const bool goes_on =
       pattern && pattern == run_ && to_seconds(pair.stamp - last_->stamp) <= kSilence_s && is_steady(pair);
   if (!goes_on) {
+    const bool is_same = pattern && pattern == run_;
+    odometry_jumped_ = pair.odometry_jumped || (is_same && odometry_jumped_);
     first_ = pair;
     run_ = pattern;
+    count_ = 1;
+    ratio_ = pattern == SpeedFault::kScaled ? pair.receiver_mps / pair.odometry_mps : 1.0;
+  } else if (run_ == SpeedFault::kScaled) {
+    ratio_ += std::max(kRatioRate, 1.0 / ++count_) * (pair.receiver_mps / pair.odometry_mps - ratio_);
   }
   last_ = pair;
-  if (run_ && to_seconds(pair.stamp - first_->stamp) >= least_time_s(*run_, *first_)) fault_ = *run_;
+  if (run_ && run_s() >= least_time_s(*run_, ratio_, odometry_jumped_)) fault_ = *run_;
   return fault_;
 }
 

@@ -55,7 +55,7 @@ void IntegrityMonitor::add(const FixMisfit& misfit) {
 
 void IntegrityMonitor::judge(Stamp now) {
   const bool is_long = to_seconds(now - window_.front().stamp) >= 0.5 * parameters_.integrity_window;
-  if (window_.size() < kLeastFixes || !is_long) return;
+  if (!is_unconfirmed_ && (window_.size() < kLeastFixes || !is_long)) return;
   const Eigen::Vector2d offset = median_offset(window_);
   // The errors of fixes last: all of the window together are worth little more than one.
   const Eigen::Matrix2d claimed = median_claim(window_);
@@ -63,6 +63,7 @@ void IntegrityMonitor::judge(Stamp now) {
   if (!std::isfinite(sigmas)) return;
   if (sigmas < kEnd * parameters_.integrity_limit) {
     if (contradiction_) end(now);
+    is_unconfirmed_ = false;
     return;
   }
   if (!contradiction_ && sigmas <= parameters_.integrity_limit) return;
@@ -94,9 +95,10 @@ void IntegrityMonitor::end(Stamp now) {
   is_persistent_ = false;
 }
 
-void IntegrityMonitor::restart() {
+void IntegrityMonitor::restart(bool is_told) {
   if (contradiction_ && !window_.empty()) end(window_.back().stamp);
   window_.clear();
+  is_unconfirmed_ = is_told;
 }
 
 }  // namespace urban_gnss

@@ -16,6 +16,15 @@ namespace {
 /// Standard deviation below which a heading tells forwards from backwards.
 constexpr double kKnownHeading_rad = 0.15;
 
+/// A start at a pose that somebody has set.
+Start told(const PoseEstimate& pose, const std::string& source) {
+  Start start;
+  start.estimate = pose;
+  start.source = source;
+  start.is_told = true;
+  return start;
+}
+
 }  // namespace
 
 Pose2 map_to_odometry(const LocalizationOutput& output) {
@@ -77,14 +86,17 @@ void LocalizationPipeline::add_odometry(const OdometrySample& sample) {
   const Stamp since = history_.empty() ? sample.stamp : history_.latest();
   const double elapsed_s = to_seconds(sample.stamp - since);
   Twist2 twist = yaw_rate_.twist_of(sample, since, events_);
+  speed_.set_wheels_contradicted(yaw_rate_.contradicts_wheels());
   twist.speed_mps = speed_.speed_of(twist.speed_mps, sample.stamp, elapsed_s, events_);
   if (elapsed_s > parameters_.input.stamps.odometry_gap) forget_odometry(elapsed_s);
   history_.add(sample.stamp, twist);
   if (initialized() && elapsed_s > 0.0) {
     localizer_->move(twist, elapsed_s);
+    const MotionDoubt doubt{speed_.doubt_m2(), yaw_rate_.doubt_rad2()};
+    if (doubt.exists()) localizer_->doubt(doubt);
     guard_against_non_finite();
   }
-  if (!initialized() && start_.given() && frame()) start_from({*start_.given(), "the given pose"});
+  if (!initialized() && start_.given() && frame()) start_from(told(*start_.given(), "the given pose"));
   process_velocities();
   process_fixes();
   if (initialized()) outputs_.push_back({sample.stamp, estimate(), sample.pose, twist});
@@ -136,7 +148,7 @@ void LocalizationPipeline::process_velocity(const RawVelocity& velocity) {
   }
   start_.add_velocity(matched->pair);
   compare_speed(*matched);
-  if (!initialized()) return;
+  if (!initialized() || !localizer_->takes_velocity()) return;
   localizer_->correct_velocity(matched->measurement);
   reporter_.count_velocity();
   guard_against_non_finite();
@@ -311,7 +323,7 @@ void LocalizationPipeline::decide(FixOutcome outcome) {
 
 void LocalizationPipeline::set_pose(const PoseEstimate& pose) {
   start_.give(pose);
-  if (frame() && !history_.empty()) start_from({pose, "a pose that was set"});
+  if (frame() && !history_.empty()) start_from(told(pose, "a pose that was set"));
 }
 
 void LocalizationPipeline::set_datum(const GeodeticPosition& datum) {
@@ -328,7 +340,7 @@ void LocalizationPipeline::set_datum(const GeodeticPosition& datum) {
 void LocalizationPipeline::start_from(const Start& start) {
   localizer_->initialize(start.estimate);
   start_.note(start);
-  integrity_.restart();
+  integrity_.restart(start.is_told);
   speed_.forget_heading();
   biases_.forget_radius();
   const Pose2& pose = start.estimate.pose;
@@ -365,11 +377,18 @@ LocalizationReport LocalizationPipeline::report() const {
   status.is_lost = start_.is_lost();
   status.waiting_for = waiting_for();
   status.bias_radius_m = biases_.radius_m();
-  status.complaint = integrity_.contradiction() ? describe(*integrity_.contradiction()) : speed_.complaint();
+  status.complaint = complaint();
   status.time_to_detect_s = integrity_.time_to_detect_s();
   status.time_to_recover_s = integrity_.time_to_recover_s();
   status.contradiction_m2 = integrity_.covariance();
   return reporter_.report(status, *localizer_);
+}
+
+std::string LocalizationPipeline::complaint() const {
+  if (integrity_.contradiction()) return describe(*integrity_.contradiction());
+  if (integrity_.is_unconfirmed()) return "no fix has confirmed the pose that was set";
+  const std::string speed = speed_.complaint();
+  return speed.empty() ? yaw_rate_.complaint() : speed;
 }
 
 std::string LocalizationPipeline::waiting_for() const {

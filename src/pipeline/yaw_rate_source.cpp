@@ -13,6 +13,8 @@ constexpr double kYawRateHold_s = 0.2;
 /// An IMU's yaw rate may be smaller than that of wheels that slip, but not in the other direction, nor larger than in
 /// degrees.
 constexpr double kMaxYawRateFactor = 10.0;
+/// A contradiction that is shorter is a glitch, or wheels that slip for a moment.
+constexpr double kLasting_s = 1.0;
 
 }  // namespace
 
@@ -29,14 +31,36 @@ void YawRateSource::add(Stamp stamp, double yaw_rate_radps) {
 
 Twist2 YawRateSource::twist_of(const OdometrySample& step, Stamp since, std::vector<PipelineEvent>& events) {
   Twist2 twist = step.twist;
+  doubt_rad2_ = 0.0;
   if (!parameters_.use_imu_yaw_rate) return twist;
   const std::optional<double> imu_radps = mean_between(since, step.stamp);
   const double duration_s = to_seconds(step.stamp - since);
   watch(imu_radps, duration_s, events);
   if (!imu_radps) return twist;
   compare(twist.yaw_rate_radps, *imu_radps, duration_s, events);
-  twist.yaw_rate_radps = *imu_radps;
+  twist.yaw_rate_radps = judge(twist.yaw_rate_radps, *imu_radps, duration_s);
   return twist;
+}
+
+double YawRateSource::judge(double odometry_radps, double imu_radps, double duration_s) {
+  const YawRateFault fault = arbiter_.add(odometry_radps, imu_radps, duration_s);
+  if (fault == YawRateFault::kNone) {
+    doubt_.end();
+  } else {
+    doubt_rad2_ = doubt_.grow((imu_radps - odometry_radps) * duration_s);
+  }
+  return fault == YawRateFault::kImu ? odometry_radps : imu_radps;
+}
+
+bool YawRateSource::contradicts_wheels() const {
+  return arbiter_.fault() == YawRateFault::kOdometry && arbiter_.lasted_s() >= kLasting_s;
+}
+
+std::string YawRateSource::complaint() const {
+  if (arbiter_.fault() == YawRateFault::kNone || arbiter_.lasted_s() < kLasting_s) return {};
+  return arbiter_.fault() == YawRateFault::kImu
+             ? "the IMU's yaw rate changed at once, the odometry's did not: the odometry's is used"
+             : "the odometry turns, and the IMU does not: one wheel dead, or slipping?";
 }
 
 std::optional<double> YawRateSource::mean_between(Stamp since, Stamp until) const {

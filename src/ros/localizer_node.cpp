@@ -112,6 +112,7 @@ std::string LocalizerNode::try_pose(const geometry_msgs::PoseWithCovarianceStamp
     return error.what();
   }
   publish_results();
+  publish_status();  // what was healthy is not any more
   return {};
 }
 

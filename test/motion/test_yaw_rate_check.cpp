@@ -42,5 +42,38 @@ TEST(YawRateCheck, BeginsAnewAfterEachMinute) {
   EXPECT_NEAR(*minute(-0.1), -1.0, 1e-9);
 }
 
+/// Both rates at 20 Hz.
+struct Rates {
+  YawRateArbiter arbiter;
+  YawRateFault add_for(double duration_s, double odometry_radps, double imu_radps) {
+    for (int k = 0; k < duration_s / 0.05; ++k) arbiter.add(odometry_radps, imu_radps, 0.05);
+    return arbiter.fault();
+  }
+};
+
+TEST(YawRateArbiter, WhoChangedAtOnceIsWrong) {
+  for (const double turning : {0.0, 0.4, -0.4}) {
+    Rates gyro;
+    ASSERT_EQ(gyro.add_for(5.0, turning, turning), YawRateFault::kNone);
+    EXPECT_EQ(gyro.add_for(3.0, turning, turning + 1.3), YawRateFault::kImu) << turning;
+    EXPECT_NEAR(gyro.arbiter.lasted_s(), 3.0, 0.06);
+    EXPECT_EQ(gyro.add_for(0.1, turning, turning), YawRateFault::kNone) << "it is back";
+    EXPECT_EQ(gyro.arbiter.lasted_s(), 0.0);
+    Rates wheels;
+    ASSERT_EQ(wheels.add_for(5.0, turning, turning), YawRateFault::kNone);
+    EXPECT_EQ(wheels.add_for(30.0, turning + 1.7, turning), YawRateFault::kOdometry) << turning;
+    EXPECT_EQ(wheels.add_for(0.1, turning, turning), YawRateFault::kNone);
+  }
+}
+
+TEST(YawRateArbiter, WheelsThatSkidAreNoContradiction) {
+  EXPECT_EQ(Rates().add_for(10.0, 2.0, 1.0), YawRateFault::kNone) << "a skid-steered robot";
+  EXPECT_EQ(Rates().add_for(10.0, 0.4, 0.0), YawRateFault::kNone) << "a bump";
+}
+
+TEST(YawRateArbiter, WheelsThatNeverAgreedAreWrong) {
+  EXPECT_EQ(Rates().add_for(1.0, 2.0, 0.0), YawRateFault::kOdometry);
+}
+
 }  // namespace
 }  // namespace urban_gnss

@@ -163,12 +163,12 @@ TEST(IntegrityMonitor, RestartKeepsTheTimesAndForgetsTheFixes) {
   const double detect_s = fixes.monitor.time_to_detect_s();
   fixes.add(25, kFar);
   ASSERT_TRUE(fixes.monitor.is_persistent());
-  fixes.monitor.restart();
+  fixes.monitor.restart(false);
   EXPECT_FALSE(fixes.monitor.contradiction());
   EXPECT_FALSE(fixes.monitor.is_persistent());
   EXPECT_EQ(fixes.monitor.time_to_detect_s(), detect_s);
   EXPECT_NEAR(fixes.monitor.time_to_recover_s(), 25.0, 1e-9);
-  fixes.monitor.restart();
+  fixes.monitor.restart(false);
   EXPECT_EQ(fixes.monitor.time_to_detect_s(), detect_s);
   EXPECT_NEAR(fixes.monitor.time_to_recover_s(), 25.0, 1e-9);
   EXPECT_FALSE(fixes.add(15, kFar)) << "14 s are less than half of the window";
@@ -201,6 +201,31 @@ TEST(IntegrityMonitor, FewerThanThreeFixesSayNothing) {
   three.interval_s = 10.0;
   EXPECT_FALSE(three.add(2, {1000.0, 0.0}));
   EXPECT_TRUE(three.add({1000.0, 0.0}));
+}
+
+TEST(IntegrityMonitor, FirstFixContradictsAPoseThatWasSet) {
+  Fixes fixes;
+  fixes.add(60, kNone);
+  fixes.monitor.restart(true);
+  EXPECT_TRUE(fixes.monitor.is_unconfirmed());
+  EXPECT_TRUE(fixes.add(kFar));
+  EXPECT_EQ(fixes.monitor.time_to_detect_s(), 0.0);
+  fixes.add(19, kFar);
+  EXPECT_FALSE(fixes.monitor.is_persistent());
+  fixes.add(kFar);
+  EXPECT_TRUE(fixes.monitor.is_persistent()) << "20 s later";
+}
+
+TEST(IntegrityMonitor, FixesThatAgreeConfirmAPoseThatWasSet) {
+  Fixes fixes;
+  fixes.monitor.restart(true);
+  EXPECT_FALSE(fixes.add({3.0, 0.0}));
+  EXPECT_FALSE(fixes.monitor.is_unconfirmed());
+  EXPECT_FALSE(fixes.add(10, kFar)) << "from then on it is an estimate like others";
+  fixes.monitor.restart(true);
+  ASSERT_TRUE(fixes.add(kFar)) << "a reflection";
+  EXPECT_LE(fixes.add_until(false, kNone), 3);
+  EXPECT_FALSE(fixes.monitor.is_unconfirmed());
 }
 
 }  // namespace

@@ -74,7 +74,6 @@ TEST(SpeedSource, AccelerationWithinTheLimitIsNoGlitch) {
 TEST(SpeedSource, ReceiverTakesThePlaceOfADeadEncoder) {
   Drive drive;
   EXPECT_EQ(drive.step_for(4.0, 0.0, 5.0), 0.0);
-  EXPECT_EQ(drive.source.complaint(), "");
   EXPECT_TRUE(drive.events.empty());
   EXPECT_EQ(drive.step_for(0.3, 0.0, 5.0), 5.0);
   EXPECT_TRUE(contains(drive.source.complaint(), "0.0 m/s")) << drive.source.complaint();
@@ -85,6 +84,35 @@ TEST(SpeedSource, ReceiverTakesThePlaceOfADeadEncoder) {
   drive.step(0.0, 7.0);
   EXPECT_EQ(drive.step(0.0), 7.0) << "as it changes";
   EXPECT_EQ(drive.events.size(), 1u);
+}
+
+// Before anything is found, who is wrong is open: that both contradict each other is not.
+TEST(SpeedSource, ContradictionIsToldAndDoubtedBeforeItIsFound) {
+  Drive drive;
+  drive.step_for(10.0, 5.0, 5.0);
+  EXPECT_EQ(drive.source.complaint(), "");
+  EXPECT_EQ(drive.source.doubt_m2(), 0.0);
+  double doubt_m2 = 0.0;
+  for (int k = 0; k < 30; ++k) {
+    EXPECT_EQ(drive.step(5.0, 3.3), 5.0);
+    doubt_m2 += drive.source.doubt_m2();
+    EXPECT_EQ(drive.source.complaint().empty(), k < 15) << k;
+  }
+  EXPECT_GT(std::sqrt(doubt_m2), 0.25 * 3.0 * 1.7) << "3 s of 1.7 m/s";
+  drive.step_for(2.0, 5.0, 5.0);
+  EXPECT_EQ(drive.source.complaint(), "") << "it was the receiver";
+  EXPECT_EQ(drive.source.doubt_m2(), 0.0);
+}
+
+TEST(SpeedSource, ReceiverTakesThePlaceOfWheelsThatAnotherSensorContradicts) {
+  Drive drive;
+  drive.step_for(10.0, 1.0, 1.1);
+  drive.source.set_wheels_contradicted(true);
+  EXPECT_EQ(drive.step(0.9), 1.1);
+  EXPECT_GT(drive.source.doubt_m2(), 0.0) << "errors of the receiver's speed last";
+  drive.source.set_wheels_contradicted(false);
+  EXPECT_EQ(drive.step(0.9), 0.9);
+  EXPECT_EQ(drive.source.doubt_m2(), 0.0);
 }
 
 // A driver that multiplies by -1 says -0.0, and an encoder that stands may say a rounded -0.001.

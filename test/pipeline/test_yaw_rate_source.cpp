@@ -1,6 +1,8 @@
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <limits>
+#include <string>
 
 #include "urban_gnss_localization/pipeline/yaw_rate_source.hpp"
 
@@ -74,6 +76,42 @@ TEST(YawRateSource, ResetForgetsRatesAndWhatWasFound) {
     steps.source.reset();
     EXPECT_EQ(steps.step(), 0.1);
   }
+}
+
+TEST(YawRateSource, StepOfTheGyroscopeIsLeftOutWithADoubt) {
+  Steps steps;
+  const auto turn = [&](int count, double imu_radps, double& doubt_rad2) {
+    double used = 0.0;
+    for (int k = 0; k < count; ++k) {
+      steps.imu(steps.time + 0.05, imu_radps);
+      used = steps.step();
+      doubt_rad2 += steps.source.doubt_rad2();
+    }
+    return used;
+  };
+  double doubt_rad2 = 0.0;
+  EXPECT_EQ(turn(50, 0.1, doubt_rad2), 0.1);
+  EXPECT_EQ(doubt_rad2, 0.0);
+  EXPECT_EQ(turn(20, 1.1, doubt_rad2), 0.1) << "the odometry's";
+  EXPECT_NEAR(std::sqrt(doubt_rad2), 0.3 * 2.0, 1e-9) << "of 2 rad";
+  EXPECT_NE(steps.source.complaint().find("IMU's yaw rate changed"), std::string::npos);
+  EXPECT_FALSE(steps.source.contradicts_wheels());
+  EXPECT_EQ(turn(1, 0.2, doubt_rad2), 0.2) << "believed again";
+  EXPECT_EQ(steps.source.complaint(), "");
+}
+
+TEST(YawRateSource, WheelsThatTurnAloneAreContradicted) {
+  YawRateSource source({true}, 2.0);
+  std::vector<PipelineEvent> events;
+  for (int k = 1; k <= 60; ++k) {
+    const Stamp since = from_seconds(0.1 * (k - 1));
+    const Stamp stamp = from_seconds(0.1 * k);
+    source.add(stamp, 0.0);
+    const double wheels_radps = k <= 30 ? 0.0 : 2.0;
+    EXPECT_EQ(source.twist_of({stamp, {}, {1.0, wheels_radps}}, since, events).yaw_rate_radps, 0.0) << k;
+    EXPECT_EQ(source.contradicts_wheels(), k > 40) << k;
+  }
+  EXPECT_NE(source.complaint().find("one wheel"), std::string::npos) << source.complaint();
 }
 
 TEST(YawRateSource, RateIsFiniteAndOfARobotsSize) {

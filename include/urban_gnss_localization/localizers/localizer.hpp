@@ -10,6 +10,7 @@
 #include "urban_gnss_localization/gnss/fix_decision.hpp"
 #include "urban_gnss_localization/gnss/satellite.hpp"
 #include "urban_gnss_localization/localizers/bias_estimate.hpp"
+#include "urban_gnss_localization/motion/motion_doubt.hpp"
 #include "urban_gnss_localization/motion/motion_model.hpp"
 
 namespace urban_gnss {
@@ -71,6 +72,8 @@ class Localizer {
 
   /// Moves by one step of odometry.
   virtual void move(const Twist2& twist, double duration_s) = 0;
+  /// The last step may be wrong by so much more than the odometry's model says. Requires variances >= 0.
+  virtual void doubt(const MotionDoubt& /*doubt*/) {}
 
   /// Takes one fix. The outcome carries the decision with its NIS.
   virtual FixOutcome correct(const FixMeasurement& fix) = 0;

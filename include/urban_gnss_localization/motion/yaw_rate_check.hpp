@@ -22,4 +22,33 @@ class YawRateCheck {
   double square_{0.0};  ///< rad^2/s, of the odometry
 };
 
+/// Which of two yaw rates contradicts the other.
+enum class YawRateFault {
+  kNone,
+  kImu,       ///< it changed at once, and the wheels did not: a gyroscope's glitch or step
+  kOdometry,  ///< the wheels changed at once, or were wrong from the start: one dead, or slipping
+};
+
+/// Tells which yaw rate is wrong where IMU and odometry contradict each other grossly: the one that has changed more
+/// since they agreed. Wheels that skid turn up to twice as fast as the robot; that is no contradiction.
+class YawRateArbiter {
+ public:
+  /// One step with both rates.
+  YawRateFault add(double odometry_radps, double imu_radps, double duration_s);
+
+  YawRateFault fault() const { return fault_; }
+  /// s since the contradiction began; 0 where there is none.
+  double lasted_s() const { return lasted_s_; }
+
+ private:
+  /// Both rates (rad/s) a moment ago, while they agreed.
+  struct Agreement {
+    double odometry_radps{0.0};
+    double imu_radps{0.0};
+  };
+  std::optional<Agreement> agreement_;
+  YawRateFault fault_{YawRateFault::kNone};
+  double lasted_s_{0.0};
+};
+
 }  // namespace urban_gnss

@@ -72,8 +72,12 @@ class IntegrityMonitor {
   /// s from there until it had ended; NaN while it lasts.
   double time_to_recover_s() const { return time_to_recover_s_; }
 
+  /// Somebody has set the pose, and no fix has agreed with it yet: until then, the first that does not contradicts it.
+  bool is_unconfirmed() const { return is_unconfirmed_; }
+
   /// The estimate is a new one: what was compared says nothing of it. Times of the last contradiction are kept.
-  void restart();
+  /// `is_told`: it is not from fixes, somebody has set it.
+  void restart(bool is_told);
   void reset() { *this = IntegrityMonitor(parameters_); }
 
  private:
@@ -86,6 +90,7 @@ class IntegrityMonitor {
   std::deque<FixMisfit> window_;
   std::optional<Contradiction> contradiction_;
   bool is_persistent_{false};
+  bool is_unconfirmed_{false};
   double time_to_detect_s_{std::numeric_limits<double>::quiet_NaN()};
   double time_to_recover_s_{std::numeric_limits<double>::quiet_NaN()};
 };

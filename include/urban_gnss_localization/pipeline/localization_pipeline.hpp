@@ -55,7 +55,9 @@ class LocalizationPipeline {
   void add_imu_yaw_rate(Stamp stamp, double yaw_rate_radps);
   void add_fix(const RawFix& fix);
   /// Whether velocities of the receiver change anything: where they are wanted, and the localizer makes use of them.
-  bool takes_velocity() const { return parameters_.velocity.use_gps_velocity && localizer_->takes_velocity(); }
+  bool takes_velocity() const {
+    return parameters_.velocity.use_gps_velocity && (localizer_->takes_velocity() || parameters_.speed.check_wheels);
+  }
   /// A velocity of the receiver. It waits for the odometry of its stamp, tells the heading from which to start, and is
   /// taken by the localizer. One that cannot be used is left out, with an event that says why.
   void add_velocity(const RawVelocity& velocity);
@@ -115,6 +117,8 @@ class LocalizationPipeline {
   bool awaits_more(Stamp fix) const;
   void start_with(const ValidatedFix& fix);
   bool restart_with(const ValidatedFix& fix);
+  /// Which sources contradict each other; empty where none do.
+  std::string complaint() const;
   void compare_speed(const MatchedVelocity& velocity);
   void watch_integrity(const ValidatedFix& fix, const Eigen::Vector2d& antenna_in_body);
   std::optional<BiasEstimate> take_bias(Stamp fix);

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "urban_gnss_localization/common/parameters.hpp"
+#include "urban_gnss_localization/motion/motion_doubt.hpp"
 #include "urban_gnss_localization/motion/speed_check.hpp"
 #include "urban_gnss_localization/pipeline/pipeline_event.hpp"
 
@@ -34,16 +35,20 @@ struct ReceiverSpeed {
 
 /// Where the forward speed comes from: the odometry, until SpeedCheck finds it wrong; then the receiver's velocity,
 /// until both agree again. Where the receiver is silent it is the odometry's all the same, with the sign that was
-/// found.
+/// found. While both contradict each other, and while the receiver's is used, there is a doubt.
 class SpeedSource {
  public:
   /// Requires parameters without faults.
-  explicit SpeedSource(const SpeedParameters& parameters) : parameters_(parameters) {}
+  explicit SpeedSource(const SpeedParameters& parameters) : parameters_(parameters), doubt_(kDoubtedShare) {}
 
   /// Compares both speeds; stamps ascend.
   void compare(const ReceiverSpeed& receiver, std::vector<PipelineEvent>& events);
   /// The speed (m/s) of the step of `duration_s` that ends at `stamp`.
   double speed_of(double odometry_mps, Stamp stamp, double duration_s, std::vector<PipelineEvent>& events);
+  /// m^2 per axis, by what the position's variance grew in the last step beyond the odometry's model.
+  double doubt_m2() const { return doubt_m2_; }
+  /// Another sensor contradicts the wheels, or does not any more.
+  void set_wheels_contradicted(bool contradicted) { is_contradicted_ = contradicted && parameters_.check_wheels; }
 
   /// Why the odometry's speed is not believed; empty where it is.
   std::string complaint() const;
@@ -52,24 +57,40 @@ class SpeedSource {
   void reset() { *this = SpeedSource(parameters_); }
 
  private:
+  /// Of the way that only one of the two saw, the standard deviation of the one that is believed.
+  static constexpr double kDoubtedShare = 0.5;
+
   struct Speed {
     Stamp stamp;
     double mps;
   };
   /// By the odometry, whatever is believed of it; nothing outside of what is remembered.
   std::optional<double> odometry_at(Stamp stamp) const;
+  /// The speed that is believed.
+  double believed_mps(double odometry_mps, Stamp stamp, double duration_s, std::vector<PipelineEvent>& events);
+  /// m^2 per axis, of a step at the believed speed.
+  double doubt_of(double odometry_mps, double believed_mps, Stamp stamp, double duration_s);
+  /// Remembers what the odometry says.
+  void note(double odometry_mps, Stamp stamp);
+  /// Whether the receiver's speed is recent enough to be used.
+  bool is_fresh(Stamp stamp) const;
+  bool is_wrong() const { return check_.fault() != SpeedFault::kNone || is_contradicted_; }
   /// Leaves out a speed that no acceleration explains, for up to 2 s.
   double without_glitch(double odometry_mps, double duration_s, std::vector<PipelineEvent>& events);
 
   SpeedParameters parameters_;
   SpeedCheck check_;
   std::deque<Speed> odometry_;             ///< of the last seconds
+  std::optional<Stamp> jumped_;            ///< when the odometry did, until a speed of the receiver came after it
   std::optional<double> last_mps_;         ///< of the odometry, that was believed
   double held_s_{0.0};                     ///< for which a speed was left out
   std::optional<double> before_jump_mps_;  ///< the speed before one that was believed after all
   bool has_agreed_{false};                 ///< with the heading's sign, while it moved
   SpeedPair shown_;                        ///< that showed the fault
   SpeedPair pair_;                         ///< that was compared last
+  bool is_contradicted_{false};            ///< by another sensor than the receiver
+  LastingDoubt doubt_;
+  double doubt_m2_{0.0};
 };
 
 }  // namespace urban_gnss

@@ -73,6 +73,14 @@ void ComplementaryEkf::move(const Twist2& twist, double duration_s) {
   dead_reckoned_ = urban_gnss::move(dead_reckoned_, twist, duration_s);
 }
 
+void ComplementaryEkf::doubt(const MotionDoubt& doubt) {
+  ErrorCovariance noise = ErrorCovariance::Zero();
+  noise.diagonal().head<2>().setConstant(doubt.position_m2);
+  noise(2, 2) = doubt.heading_rad2;
+  filter_.predict(filter_.bias_free_state(), ErrorCovariance::Identity(), noise);
+  path_variance_m2_ += doubt.position_m2;
+}
+
 void ComplementaryEkf::set_mode(ComplementaryMode mode) {
   if (mode != ComplementaryMode::kCompensated) close();
   parameters_.mode = mode;

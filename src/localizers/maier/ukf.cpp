@@ -113,6 +113,13 @@ void Ukf::move(const Twist2& twist, double duration_s) {
   accept(state + mean, covariance);
 }
 
+void Ukf::doubt(const MotionDoubt& doubt) {
+  Covariance covariance = covariance_;
+  covariance.diagonal().head<2>().array() += doubt.position_m2;
+  covariance(kYaw, kYaw) += doubt.heading_rad2;
+  accept(state_, covariance);
+}
+
 bool Ukf::accept(State state, Covariance covariance) {
   if (!state.allFinite() || !covariance.allFinite()) return false;
   state[kYaw] = wrap_angle(state[kYaw]);

@@ -51,6 +51,11 @@ void predict(BiasGaussian& state, const MotionStep& motion, const OdometryErrorP
   state.covariance.bottomLeftCorner<2, kMotionStates>() = with_bias.transpose();
 }
 
+void doubt(BiasGaussian& state, const MotionDoubt& doubt) {
+  state.covariance.diagonal().head<2>().array() += doubt.position_m2;
+  state.covariance(kYaw, kYaw) += doubt.heading_rad2;
+}
+
 void continue_bias(BiasGaussian& state, BiasMode from, BiasMode to, double elapsed_s, const BiasModeParameters& p) {
   const bool goes_on = from != BiasMode::kDirect && (to == BiasMode::kSlow || to == BiasMode::kFast);
   if (goes_on) {

@@ -53,6 +53,10 @@ void ImmEkf::move(const Twist2& twist, double duration_s) {
   }
 }
 
+void ImmEkf::doubt(const MotionDoubt& doubt) {
+  for (Gaussian& filter : filters_) urban_gnss::doubt(filter, doubt);
+}
+
 ImmEkf::Branches ImmEkf::branch(const FixMeasurement& fix) const {
   const double elapsed_s = statistics_.elapsed_s(fix.time_s);
   const FixNoise noise = statistics_.fix_noise(fix.time_s);

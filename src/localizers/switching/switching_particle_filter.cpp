@@ -120,6 +120,11 @@ void SwitchingParticleFilter::move(const Twist2& twist, double duration_s) {
   update_estimate();
 }
 
+void SwitchingParticleFilter::doubt(const MotionDoubt& doubt) {
+  for (BiasHypothesis& each : hypotheses_) urban_gnss::doubt(each.state, doubt);
+  update_estimate();
+}
+
 bool SwitchingParticleFilter::continue_all(const FixMeasurement& fix, Opinion& opinion) {
   const double elapsed_s = statistics_.elapsed_s(fix.time_s);
   const FixNoise noise = statistics_.fix_noise(fix.time_s);

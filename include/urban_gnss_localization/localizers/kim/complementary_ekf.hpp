@@ -39,6 +39,7 @@ class ComplementaryEkf : public Localizer {
   bool estimates_bias() const override { return true; }
   void initialize(const PoseEstimate& start) override;
   void move(const Twist2& twist, double duration_s) override;
+  void doubt(const MotionDoubt& doubt) override;
   FixOutcome correct(const FixMeasurement& fix) override;
   Pose2 pose() const override { return pose_; }
   PoseEstimate estimate() const override;

@@ -85,6 +85,7 @@ class Ukf : public Localizer {
   void initialize(const PoseEstimate& start) override;
   /// Leaves out a step that is not finite or not positive in duration.
   void move(const Twist2& twist, double duration_s) override;
+  void doubt(const MotionDoubt& doubt) override;
   /// kRejectedNonFinite for a fix that is not finite or has no positive definite covariance.
   FixOutcome correct(const FixMeasurement& fix) override;
   Pose2 pose() const override { return {state_[0], state_[1], state_[2]}; }

@@ -122,6 +122,9 @@ BiasGaussian match_moments(std::size_t count, const StateOf& state_of, const Wei
 /// Dead-reckons one step.
 void predict(BiasGaussian& state, const MotionStep& step, const OdometryErrorParameters& parameters);
 
+/// Adds what the last step may be wrong by.
+void doubt(BiasGaussian& state, const MotionDoubt& doubt);
+
 /// The bias goes on from the last fix, in the lasting mode `from`, to one `elapsed_s` >= 0 later in mode `to`:
 /// predict_bias() within the state.
 void continue_bias(BiasGaussian& state, BiasMode from, BiasMode to, double elapsed_s,

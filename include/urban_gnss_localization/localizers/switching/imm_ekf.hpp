@@ -33,6 +33,7 @@ class ImmEkf : public Localizer {
   void initialize(const PoseEstimate& start) override;
   /// Leaves out a step that is not finite or not positive in duration.
   void move(const Twist2& twist, double duration_s) override;
+  void doubt(const MotionDoubt& doubt) override;
   /// kRejectedNonFinite for a fix that is not finite or has no positive definite covariance.
   FixOutcome correct(const FixMeasurement& fix) override;
   bool takes_velocity() const override { return true; }

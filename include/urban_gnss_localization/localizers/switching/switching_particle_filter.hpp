@@ -62,6 +62,7 @@ class SwitchingParticleFilter : public ParticleLocalizer {
   void initialize(const PoseEstimate& start) override;
   /// Leaves out a step that is not finite or not positive in duration.
   void move(const Twist2& twist, double duration_s) override;
+  void doubt(const MotionDoubt& doubt) override;
   /// kRejectedNonFinite for a fix that is not finite or has no positive definite covariance.
   FixOutcome correct(const FixMeasurement& fix) override;
   /// Leaves out a velocity that cannot be used.
