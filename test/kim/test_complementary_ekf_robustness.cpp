@@ -223,7 +223,10 @@ std::string trace(const std::string& yaml) {
   text.precision(17);
   const auto drive_through = [&](const std::string& mode) {
     const YAML::Node node = YAML::Load(yaml);
-    YAML::Node merged = YAML::Load("{}");
+    // As by default, of what the paper's experiment has no use for.
+    YAML::Node merged = YAML::Load(
+        "{correlation_distance: 15.0, correlation_time: 40.0, common_error_share: 0.7, common_error_min: 0.7, "
+        "common_error_max: 1.2}");
     if (!mode.empty()) merged["mode"] = mode;
     for (const auto& entry : node) merged[entry.first.as<std::string>()] = entry.second;
     YAML::Emitter out;
@@ -231,7 +234,7 @@ std::string trace(const std::string& yaml) {
     Drive drive(8, out.c_str());
     const auto note = [&](const FixMeasurement&) {
       text << drive.filter.pose().x << ' ' << drive.filter.smallest_detectable_jump_m() << ' '
-           << drive.filter.error_covariance()(2, 2) << ' ' << to_string(drive.last.decision) << drive.last.reason
+           << drive.filter.error_covariance()(2, 2) << ' ' << drive.filter.estimate().covariance(0, 0) << ' ' << to_string(drive.last.decision) << drive.last.reason
            << drive.filter.is_gate_inert() << '\n';
     };
     drive.run(60.0, note);
@@ -267,7 +270,7 @@ TEST(ComplementaryEkfParameters, EachHasAnEffect) {
   const std::string reference = trace("{}");
   EXPECT_TRUE(trace("{}") == reference) << "the same input gives the same output";
   ParameterList list;
-  list.add(ComplementaryEkfParameters());
+  list.add(published_complementary_ekf());
   for (const ListedParameter& listed : list.parameters()) {
     const std::string& name = listed.name;
     const std::string& value = listed.value;
@@ -285,6 +288,10 @@ TEST(ComplementaryEkfParameters, EachHasAnEffect) {
       other = "0.6";
     } else if (name == "inert_probability") {
       other = "0.09";
+    } else if (name.rfind("common_error", 0) == 0) {
+      other = name == "common_error_min" ? "0.9" : "1.0";
+    } else if (name.rfind("correlation_", 0) == 0) {
+      other = "90.0";
     } else if (name == "fix_noise_max_inflation") {
       other = "1.01";
     } else if (name == "motion_model") {

@@ -191,7 +191,7 @@ TEST(Ukf, IsConsistentInTheOpen) {
 TEST(Ukf, DefaultsAreNotOverconfidentInTheOpen) {
   constexpr int kSeeds = 50;
   double mean = 0.0;
-  for (int seed = 0; seed < kSeeds; ++seed) mean += nees_of_drive(UkfParameters(), 100 + seed).pose / kSeeds;
+  for (int seed = 0; seed < kSeeds; ++seed) mean += nees_of_drive(published_ukf(), 100 + seed).pose / kSeeds;
   // Robust weights and inflation for correlation, where neither is called for, make it careful, but not useless.
   EXPECT_LT(mean, 3.0 + 3.0 * std::sqrt(6.0 / kSeeds));
   EXPECT_GT(mean, 0.9);
@@ -199,7 +199,7 @@ TEST(Ukf, DefaultsAreNotOverconfidentInTheOpen) {
 
 TEST(Ukf, LearnsSpeedScaleAndYawRateBias) {
   RandomEngine engine = make_engine(5);
-  Ukf ukf(UkfParameters(), {});
+  Ukf ukf(published_ukf(), {});
   constexpr double kScale = 0.025;
   constexpr double kBias_radps = -0.004;
   Pose2 truth;

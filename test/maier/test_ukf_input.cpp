@@ -71,7 +71,7 @@ TEST(UkfInput, ParkedRobotStays) {
 }
 
 Ukf settled(OutlierPolicy policy) {
-  UkfParameters p;
+  UkfParameters p = published_ukf();
   p.outliers = policy;
   Ukf ukf(p, {});
   ukf.initialize(pose_with_sigma({}, 1.0, 0.05));
@@ -156,7 +156,7 @@ TEST(UkfInput, LeverArmAndLatenessAreInThePrediction) {
 TEST(UkfInput, CorrelatedErrorsTellLess) {
   const auto variance_after = [](double tau_s, double interval_s, double sigma) {
     auto p = plain();
-    p.fix_correlation_time = tau_s;
+    p.fix_noise.errors.time = tau_s;
     Ukf ukf(p, noise_free());
     ukf.initialize(pose_with_sigma({}, 1.0, 0.0));
     ukf.correct(fix_at({0.0, 0.0}, 1.0, 100.0));
@@ -182,22 +182,27 @@ TEST(UkfInput, EveryParameterHasAnEffect) {
       ukf.move(i % 100 < 90 ? Twist2{2.0, 0.2} : Twist2{}, 0.1);
       const double off = i > 200 ? 60.0 : 1.0;
       if (i % 10 == 0) {
-        const FixOutcome outcome =
-            ukf.correct(fix_at(ukf.pose().position() + off * Eigen::Vector2d(draw_normal(engine), 1.0), 2.0, 0.1 * i));
+        const Eigen::Vector2d aside = off * Eigen::Vector2d(draw_normal(engine), 1.0);
+        const double sigma = i > 100 ? 2.0 : 3.0;
+        const FixOutcome outcome = ukf.correct(fix_at(ukf.pose().position() + aside, sigma, 0.1 * i));
         text << static_cast<int>(outcome.decision);
       }
     }
-    text << ukf.state() << ukf.covariance();
+    text << ukf.state() << ukf.covariance() << ukf.estimate().covariance;
     return text.str();
   };
   for (const std::string& name : parameter_names(UkfParameters())) {
     const bool is_of_gate = name.rfind("gate_", 0) == 0;
-    const auto base = with(UkfParameters(), is_of_gate ? "outliers: gate" : "outliers: student_t");
+    auto base = with(UkfParameters(), is_of_gate ? "outliers: gate" : "outliers: student_t");
+    if (name == "common_error_max") base.common_error.common_error_min = 0.1;
     const std::string value = name == "outliers"           ? "none"
-                              : name == "gate_probability" ? "0.5"
+                              : name == "gate_probability" ? "0.2"
                               : name == "gate_timeout"     ? "2.0"
                               : name == "ukf_alpha"        ? "0.9"
                               : name == "ukf_beta"         ? "0.0"
+                              : name == "fix_scale_limit"  ? "1.1"
+                              : name == "fix_scale_lag"    ? "25.0"
+                              : name == "common_error_min" ? "3.0"
                                                            : "0.2";
     EXPECT_NE(outcome(with(base, name + ": " + value)), outcome(base)) << name;
   }

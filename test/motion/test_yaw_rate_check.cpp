@@ -68,7 +68,7 @@ TEST(YawRateArbiter, WhoChangedAtOnceIsWrong) {
 
 TEST(YawRateArbiter, WheelsThatSkidAreNoContradiction) {
   EXPECT_EQ(Rates().add_for(10.0, 2.0, 1.0), YawRateFault::kNone) << "a skid-steered robot";
-  EXPECT_EQ(Rates().add_for(10.0, 0.4, 0.0), YawRateFault::kNone) << "a bump";
+  EXPECT_EQ(Rates().add_for(10.0, 0.25, 0.0), YawRateFault::kNone) << "a bump";
 }
 
 TEST(YawRateArbiter, WheelsThatNeverAgreedAreWrong) {

@@ -108,7 +108,7 @@ TEST(LocalizationMotion, VelocitiesAreTheSameAfterAClockThatWasSetBack) {
 TEST(LocalizationMotion, VelocitiesAreForThoseWhoWantThem) {
   for (const bool use : {true, false}) {
     for (const bool takes : {true, false}) {
-      Rig rig(std::string("{datum: [33.0, 130.0, 20.0], initial_pose: [0.0, 0.0, 0.0], use_gps_velocity: ") +
+      Rig rig(std::string("{datum: [33.0, 130.0, 20.0], initial_pose: [0.0, 0.0, 0.0], check_wheels: false, use_gps_velocity: ") +
               (use ? "true}" : "false}"));
       rig.fake->takes = takes;
       rig.run(0.0, 1.0, false);
@@ -143,6 +143,23 @@ double start_time(bool with_velocities, double& yaw_error) {
   return kInfinity;
 }
 
+// Wheels are checked beside any localizer.
+TEST(LocalizationMotion, VelocitiesTellOfTheWheelsWhereTheLocalizerDoesNotTakeThem) {
+  Rig rig("{datum: [33.0, 130.0, 20.0], initial_pose: [0.0, 0.0, 0.0]}");
+  rig.fake->takes = false;
+  EXPECT_TRUE(rig.pipeline.takes_velocity());
+  for (int k = 0; k <= 100; ++k) {
+    OdometrySample sample = Rig::odometry(0.1 * k);
+    sample.twist.speed_mps = 0.0;
+    rig.pipeline.add_odometry(sample);
+    if (k % 10 == 0) rig.fix(0.1 * k);
+    if (k % 10 == 0) rig.pipeline.add_velocity(Rig::velocity(0.1 * k));
+  }
+  EXPECT_TRUE(rig.fake->velocities.empty());
+  EXPECT_GT(rig.fake->moves.back().first.speed_mps, 1.5) << "the receiver's";
+  EXPECT_GT(rig.fake->doubted.position_m2, 0.0);
+}
+
 TEST(LocalizationMotion, VelocitiesTellTheHeadingWithinSeconds) {
   double with_error = kNaN;
   double without_error = kNaN;
@@ -157,16 +174,16 @@ TEST(LocalizationMotion, ImuYawRateReplacesTheOdometrys) {
             (use ? "true}" : "false}"));
     rig.drive(0.0);
     rig.pipeline.add_imu_yaw_rate(Rig::at(0.0), 99.0);  // belongs to the step before; and absurd
-    rig.pipeline.add_imu_yaw_rate(Rig::at(0.02), 0.4);
-    rig.pipeline.add_imu_yaw_rate(Rig::at(0.06), 0.6);
-    rig.pipeline.add_imu_yaw_rate(Rig::at(0.12), 5.0);  // belongs to the step after
+    rig.pipeline.add_imu_yaw_rate(Rig::at(0.02), 0.2);
+    rig.pipeline.add_imu_yaw_rate(Rig::at(0.06), 0.3);
+    rig.pipeline.add_imu_yaw_rate(Rig::at(0.12), 0.4);  // belongs to the step after
     rig.drive(0.1);
-    EXPECT_NEAR(rig.fake->moves[0].first.yaw_rate_radps, use ? 0.5 : 0.1, 1e-12);
+    EXPECT_NEAR(rig.fake->moves[0].first.yaw_rate_radps, use ? 0.25 : 0.1, 1e-12);
     EXPECT_EQ(rig.fake->moves[0].first.speed_mps, 2.0);
     rig.drive(0.2);
-    EXPECT_NEAR(rig.fake->moves[1].first.yaw_rate_radps, use ? 5.0 : 0.1, 1e-12);
+    EXPECT_NEAR(rig.fake->moves[1].first.yaw_rate_radps, use ? 0.4 : 0.1, 1e-12);
     rig.drive(0.3);  // none came: a moment before is near enough
-    EXPECT_NEAR(rig.fake->moves[2].first.yaw_rate_radps, use ? 5.0 : 0.1, 1e-12);
+    EXPECT_NEAR(rig.fake->moves[2].first.yaw_rate_radps, use ? 0.4 : 0.1, 1e-12);
     rig.drive(0.4);  // and now too long ago
     rig.drive(0.5);
     EXPECT_NEAR(rig.fake->moves[4].first.yaw_rate_radps, 0.1, 1e-12);

@@ -51,9 +51,9 @@ std::string trace(const std::string& base, const std::string& change, bool wants
   return out.str();
 }
 
-/// A pose that is 40 m off, a glitch of the speed at 70 s, and a dead encoder from 80 s on.
+/// An estimate that goes 40 m off at 10 s, a glitch of the speed at 70 s, and a dead encoder from 80 s on.
 std::string trace_of_faults(const std::string& changes) {
-  Rig rig(with(with(LocalizationParameters{}, "{datum: [33.0, 130.0, 20.0], initial_pose: [0.0, 40.0, 0.0]}"), changes),
+  Rig rig(with(with(LocalizationParameters{}, "{datum: [33.0, 130.0, 20.0], initial_pose: [0.0, 0.0, 0.0]}"), changes),
           std::make_unique<FakeLocalizer>());
   SatelliteObservation satellite;
   satellite.id = {Constellation::kGps, 7};
@@ -67,6 +67,7 @@ std::string trace_of_faults(const std::string& changes) {
     if (k % 10 == 0) rig.fix(time);
     if (k % 10 == 0) rig.pipeline.add_velocity(Rig::velocity(time));
     OdometrySample sample = Rig::odometry(time);
+    if (k == 100) rig.fake->state.pose.y += 40.0;
     if (k == 700) sample.twist.speed_mps = 100.0;
     if (k > 800) sample.twist.speed_mps = 0.0;
     rig.pipeline.add_odometry(sample);

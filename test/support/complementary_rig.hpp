@@ -27,7 +27,7 @@ struct Drive {
   FixOutcome last;
 
   explicit Drive(std::uint64_t seed, const std::string& yaml = "{}", double odometry_rate_hz = 10.0)
-      : parameters(with(ComplementaryEkfParameters(), yaml)),
+      : parameters(with(published_complementary_ekf(), yaml)),
         filter(parameters),
         engine(make_engine(seed)),
         rate_hz(odometry_rate_hz) {

@@ -27,6 +27,7 @@ struct FakeLocalizer : Localizer {
   PoseEstimate state;
   std::vector<PoseEstimate> starts;
   std::vector<std::pair<Twist2, double>> moves;
+  MotionDoubt doubted;
   std::vector<FixMeasurement> fixes;
   bool takes{true};  ///< velocities
   std::vector<VelocityMeasurement> velocities;
@@ -42,6 +43,10 @@ struct FakeLocalizer : Localizer {
   void move(const Twist2& twist, double duration_s) override {
     moves.emplace_back(twist, duration_s);
     state.pose = urban_gnss::move(state.pose, twist, duration_s);
+  }
+  void doubt(const MotionDoubt& doubt) override {
+    doubted.position_m2 += doubt.position_m2;
+    doubted.heading_rad2 += doubt.heading_rad2;
   }
   FixOutcome correct(const FixMeasurement& fix) override {
     fixes.push_back(fix);

@@ -17,9 +17,9 @@ inline FixMeasurement fix_at(const Eigen::Vector2d& position, double sigma, doub
 
 /// The textbook filter: nothing robust, independent errors, the motion model's noise as it is.
 inline UkfParameters plain() {
-  UkfParameters p;
+  UkfParameters p = published_ukf();
   p.outliers = OutlierPolicy::kNone;
-  p.fix_correlation_time = 0.0;
+  p.fix_noise.errors = {0.0, 0.0};
   p.odometry.motion_noise_factor = 1.0;
   return p;
 }

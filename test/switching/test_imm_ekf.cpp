@@ -287,7 +287,7 @@ TEST(ImmEkf, LeverArmIsInTheAntennasPlace) {
 TEST(ImmEkf, EveryParameterHasAnEffect) {
   const std::vector<ParameterChange> changes = switching_model_changes();
   // Elsewhere: parked_walk, fix_covariance_weight, the common error's, the velocity's and the ranges'.
-  EXPECT_EQ(changes.size() + 2 + parameter_names(CommonErrorParameters{}).size() +
+  EXPECT_EQ(changes.size() + 3 + parameter_names(CommonErrorParameters{}).size() +
                 parameter_names(VelocityNoiseParameters{}).size() + parameter_names(RangeFixParameters{}).size(),
             parameter_names(ImmEkfParameters{}).size());
   SwitchingDrive d;

@@ -289,7 +289,7 @@ TEST(SwitchingParticleFilter, EveryParameterHasAnEffect) {
                                 });
   // Those of a parked robot, of changing declarations, and of the covariance alone; elsewhere,
   // those of ranges.
-  EXPECT_EQ(changes.size() + 2 + parameter_names(CommonErrorParameters{}).size() +
+  EXPECT_EQ(changes.size() + 3 + parameter_names(CommonErrorParameters{}).size() +
                 parameter_names(RangeFixParameters{}).size(),
             parameter_names(SwitchingParticleFilterParameters{}).size());
   SwitchingDrive d;

@@ -16,7 +16,8 @@ namespace urban_gnss {
 
 /// What the comparison of Kim et al., figure 6, depends on, the scenario aside.
 struct BiasExperimentConditions {
-  ComplementaryEkfParameters filter;    ///< mode and adapt_every_mode are replaced
+  /// Mode and adapt_every_mode are replaced.
+  ComplementaryEkfParameters filter = published_complementary_ekf();
   LocalizationParameters localization;  ///< datum and antenna are replaced by the scenario's
 };
 

@@ -14,8 +14,8 @@
 namespace urban_gnss {
 
 /// What the comparison of Maier and Kleiner 2010, Tables I and II, depends on, the scenario aside. Where it differs
-/// from the nodes' defaults it follows the paper: the filter is Gaussian, its yaw rate is the IMU's, and the
-/// covariances are used as the models give them, also below the receiver's claim.
+/// from the nodes' defaults it follows the paper: the filter is Gaussian and published_ukf(), its yaw rate is
+/// the IMU's, and the covariances are used as the models give them, also below the receiver's claim.
 struct OcclusionExperimentConditions {
   OcclusionExperimentConditions() {
     occlusion.covariance.allow_smaller = true;
@@ -24,7 +24,7 @@ struct OcclusionExperimentConditions {
   }
 
   OcclusionPipelineParameters occlusion;  ///< model and antenna are replaced
-  UkfParameters ukf;
+  UkfParameters ukf = published_ukf();
   MotionParameters motion;
   LocalizationParameters localization;  ///< datum and antenna are replaced by the scenario's
   int cloud_every{5};                   ///< of a spinning lidar's scans, one in so many goes into the maps

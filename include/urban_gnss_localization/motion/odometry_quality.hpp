@@ -38,6 +38,9 @@ using QualityTransition = Eigen::Matrix<double, kQualityLevels, kQualityLevels>;
 std::array<OdometryErrorParameters, kQualityLevels> quality_levels(const OdometryErrorParameters& best,
                                                                    const OdometryQualityParameters& parameters);
 
+/// The errors of an odometry of the middle level: for filters that do not learn which one it is.
+inline OdometryErrorParameters middle_quality() { return quality_levels({}, {})[kQualityLevels / 2]; }
+
 /// One step of the odometry with the noise of each level.
 std::array<MotionStep, kQualityLevels> make_motion_steps(
     const Twist2& twist, double duration_s, const MotionParameters& motion,

@@ -43,6 +43,7 @@ void ComplementaryEkf::initialize(const PoseEstimate& start) {
   path_variance_m2_ = 0.0;
   is_open_ = false;
   had_fix_ = false;
+  common_variance_m2_ = 0.0;
   insignificant_ = 0;
   is_inert_ = false;
   run_.reset();
@@ -120,6 +121,10 @@ FixOutcome ComplementaryEkf::correct(const FixMeasurement& fix) {
   }
   last_fix_s_ = fix.time_s;
   had_fix_ = true;
+  if (is_adaptive()) {
+    const double declared_m2 = 0.5 * fix.covariance.trace();
+    common_variance_m2_ = parameters_.common_error.variance_m2(noise_monitor_.size() * declared_m2, declared_m2);
+  }
   since_fix_ = {};
   publish(fix, predicted, outcome);
   return outcome;
@@ -131,7 +136,12 @@ bool ComplementaryEkf::is_adaptive() const {
 
 double ComplementaryEkf::noise_inflation() const {
   if (!is_adaptive()) return 1.0;
-  const double inflation = noise_monitor_.inflation();
+  double inflation = noise_monitor_.inflation();
+  if (had_fix_ && parameters_.fix_noise.adapt_fix_noise) {
+    // Errors that last for longer than the monitor's horizon, at the size that it has found.
+    const double lasting = parameters_.errors.inflation(since_fix_.distance_m, since_fix_.duration_s);
+    inflation = std::max(inflation, noise_monitor_.size() * lasting);
+  }
   if (!since_fix_.is_standstill()) return inflation;
   // The mean of errors of correlation time tau over a time T has the variance 2 tau / T of one of them.
   return std::max(inflation, 2.0 * parameters_.parked_correlation_time / since_fix_.duration_s);
@@ -333,7 +343,9 @@ double ComplementaryEkf::smallest_detectable_jump_m() const {
 }
 
 PoseEstimate ComplementaryEkf::estimate() const {
-  return {pose_, filter_.compensated_covariance().topLeftCorner<3, 3>()};
+  PoseEstimate estimate{pose_, filter_.compensated_covariance().topLeftCorner<3, 3>()};
+  estimate.covariance.diagonal().head<2>().array() += common_variance_m2_;
+  return estimate;
 }
 
 LocalizerHealth ComplementaryEkf::health() const {

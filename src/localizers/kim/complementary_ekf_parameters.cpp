@@ -20,4 +20,21 @@ MotionParameters kim_motion() {
   return motion;
 }
 
+OdometryErrorParameters kim_odometry_errors() {
+  OdometryErrorParameters odometry = middle_quality();
+  odometry.motion_noise_factor = 1.0;
+  odometry.yaw_rate_bias_walk = 3e-5;
+  odometry.parked_walk = 0.0;
+  odometry.standstill_radps = 1e-4;
+  return odometry;
+}
+
+ComplementaryEkfParameters published_complementary_ekf() {
+  ComplementaryEkfParameters p;
+  p.errors = {0.0, 0.0};
+  p.common_error = {0.0, 0.0, 0.0};
+  p.odometry = {1.0, 0.02, 2e-4, 0.005, 3e-5, 0.05, 0.003, 0.0, 1e-4};
+  return p;
+}
+
 }  // namespace urban_gnss

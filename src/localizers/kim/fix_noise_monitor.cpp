@@ -54,8 +54,14 @@ void FixNoiseMonitor::add(const Eigen::Vector2d& position, const Eigen::Matrix2d
   fixes_.push_back(fix);
 }
 
+bool FixNoiseMonitor::is_ready() const {
+  return parameters_.adapt_fix_noise && near_.count >= kLeastPairs && far_.count >= kLeastPairs;
+}
+
+double FixNoiseMonitor::size() const { return is_ready() ? far_.mean : 1.0; }
+
 double FixNoiseMonitor::inflation() const {
-  if (!parameters_.adapt_fix_noise || near_.count < kLeastPairs || far_.count < kLeastPairs) return 1.0;
+  if (!is_ready()) return 1.0;
   const double near = std::max(near_.mean, kLeastNear);
   const double factor = far_.mean * std::max(1.0, (2.0 * far_.mean - near) / near);
   return std::clamp(factor, 1.0, parameters_.fix_noise_max_inflation);

@@ -8,7 +8,6 @@
 
 #include "urban_gnss_localization/common/positive_definite.hpp"
 #include "urban_gnss_localization/gnss/chi_squared.hpp"
-#include "urban_gnss_localization/gnss/correlated_errors.hpp"
 #include "urban_gnss_localization/motion/dead_reckoning.hpp"
 #include "urban_gnss_localization/motion/standstill.hpp"
 
@@ -40,6 +39,17 @@ EnumNames<OutlierPolicy> enum_names(OutlierPolicy) {
   return {{"student_t", OutlierPolicy::kStudentT}, {"gate", OutlierPolicy::kGate}, {"none", OutlierPolicy::kNone}};
 }
 
+UkfParameters published_ukf() {
+  UkfParameters p;
+  p.fix_noise.fix_scale_rate = 0.0;
+  p.fix_noise.fix_covariance_weight = 1.0;
+  p.fix_noise.fix_scale_lag = 0.0;
+  p.fix_noise.errors = {0.0, 1.0};
+  p.common_error = {0.0, 0.0, 0.0};
+  p.odometry = {0.1, 0.03, 2e-4, 0.005, 3e-5, 0.0, 0.0, 0.03};
+  return p;
+}
+
 Ukf::Ukf(const UkfParameters& parameters, const MotionParameters& motion)
     : parameters_(parameters),
       motion_(motion),
@@ -47,7 +57,8 @@ Ukf::Ukf(const UkfParameters& parameters, const MotionParameters& motion)
           UnscentedWeights::of(kAugmented, parameters.ukf_alpha, parameters.ukf_beta, parameters.ukf_kappa)),
       fix_weights_(UnscentedWeights::of(kDimension, parameters.ukf_alpha, parameters.ukf_beta, parameters.ukf_kappa)),
       nis_threshold_(parameters.gate_probability < 1.0 ? chi_squared_quantile(parameters.gate_probability, kFixDof)
-                                                       : std::numeric_limits<double>::infinity()) {
+                                                       : std::numeric_limits<double>::infinity()),
+      noise_(parameters.fix_noise) {
   initialize({});
 }
 
@@ -58,12 +69,16 @@ void Ukf::initialize(const PoseEstimate& start) {
   state_ << start.pose.x, start.pose.y, wrap_angle(start.pose.yaw), 0.0, 0.0;
   covariance_ = is_positive_definite(covariance) ? covariance : nearest_positive_definite(covariance);
   limit_yaw_variance(covariance_);
-  last_used_s_.reset();
+  noise_.reset();
+  track_ = {};
+  common_variance_m2_ = 0.0;
   rejected_since_s_.reset();
 }
 
 void Ukf::move(const Twist2& twist, double duration_s) {
   if (!is_usable(twist, duration_s)) return;
+  noise_.move(twist, duration_s);
+  track_.move(twist, duration_s);
   if (is_standstill(twist, parameters_.odometry.standstill_radps)) {
     Covariance covariance = covariance_;
     const double walk = parameters_.odometry.parked_walk;
@@ -152,13 +167,17 @@ Ukf::Prediction Ukf::predict(const Eigen::Vector2d& antenna_in_body) const {
   return prediction;
 }
 
-FixOutcome Ukf::correct(const FixMeasurement& fix) {
+FixOutcome Ukf::correct(const FixMeasurement& declared) {
   FixOutcome outcome;
-  if (!is_usable(fix)) {
+  if (!is_usable(declared)) {
     outcome.decision = FixDecision::kRejectedNonFinite;
     outcome.reason = "position, time or covariance cannot be used";
     return outcome;
   }
+  FixMeasurement fix = declared;
+  const Eigen::Matrix2d effective = noise_.effective_covariance(declared.covariance);
+  fix.covariance = noise_.scale() * effective;
+  const State before = state_;
   Prediction prediction = predict(fix.antenna_in_body);
   const Eigen::Vector2d innovation = fix.position - prediction.position;
   outcome.nis = innovation.dot((prediction.covariance + fix.covariance).ldlt().solve(innovation));
@@ -175,7 +194,7 @@ FixOutcome Ukf::correct(const FixMeasurement& fix) {
       outcome.reason = "outlier, weight " + std::to_string(weight);
     }
   }
-  const Eigen::Matrix2d noise = correlation_inflation(fix.time_s) / weight * fix.covariance;
+  const Eigen::Matrix2d noise = noise_.correlation_inflation(fix.time_s) / weight * fix.covariance;
   const Eigen::Matrix2d innovation_covariance = prediction.covariance + noise;
   const Eigen::Matrix<double, kDimension, 2> gain =
       innovation_covariance.ldlt().solve(prediction.with_state.transpose()).transpose();
@@ -184,12 +203,24 @@ FixOutcome Ukf::correct(const FixMeasurement& fix) {
     outcome.reason = "the update is not finite";
     return outcome;
   }
-  last_used_s_ = fix.time_s;
+  fix.covariance = effective;
+  learn(fix, outcome.nis, prediction.position, before);
   return outcome;
 }
 
-double Ukf::correlation_inflation(double time_s) const {
-  return last_used_s_ ? markov_inflation(time_s - *last_used_s_, parameters_.fix_correlation_time) : 1.0;
+void Ukf::learn(const FixMeasurement& declared, double nis, const Eigen::Vector2d& antenna, const State& before) {
+  noise_.learn(declared.time_s, nis > LearntScale::kMedianNis ? 1.0 : 0.0);
+  noise_.compare(track_.beside(declared.position, declared.covariance, antenna, std::sqrt(covariance_(kYaw, kYaw)),
+                               parameters_.odometry.position_walk, declared.time_s));
+  track_.correct(before.head<2>(), state_.head<2>());
+  const double declared_m2 = 0.5 * declared.covariance.trace();
+  common_variance_m2_ = parameters_.common_error.variance_m2(noise_.scale() * declared_m2, declared_m2);
+}
+
+PoseEstimate Ukf::estimate() const {
+  PoseEstimate estimate{pose(), covariance_.topLeftCorner<3, 3>()};
+  estimate.covariance.diagonal().head<2>().array() += common_variance_m2_;
+  return estimate;
 }
 
 bool Ukf::is_settled_by_gate(const FixMeasurement& fix, const Eigen::Vector2d& innovation, FixOutcome& outcome) {
@@ -214,7 +245,7 @@ bool Ukf::is_settled_by_gate(const FixMeasurement& fix, const Eigen::Vector2d& i
     return true;
   }
   rejected_since_s_.reset();
-  last_used_s_ = fix.time_s;
+  noise_.learn(fix.time_s, 1.0);
   outcome.reason = "restarted on the fix after " + std::to_string(parameters_.gate_timeout) + " s of rejections";
   return true;
 }

@@ -35,19 +35,18 @@ void FixStatistics::reset() {
   velocity_scale_ = parameters_.velocity.fresh_scale();
   last_fix_s_.reset();
   last_velocity_s_.reset();
-  travel_ = {};
-  corrections_.setZero();
+  track_ = {};
   common_variance_m2_ = 0.0;
 }
 
 void FixStatistics::move(const Twist2& twist, double duration_s) {
-  travel_.add(twist, duration_s);
+  track_.move(twist, duration_s);
   noise_.move(twist, duration_s);
   range_noise_.move(twist, duration_s);
 }
 
 double FixStatistics::elapsed_s(double time_s) const {
-  return last_fix_s_ ? std::max(time_s - *last_fix_s_, 0.0) : travel_.duration_s;
+  return last_fix_s_ ? std::max(time_s - *last_fix_s_, 0.0) : track_.travel().duration_s;
 }
 
 double FixStatistics::range_sigma_m() const {
@@ -81,7 +80,7 @@ void FixStatistics::learn_velocity(double time_s, double exceeding, const BiasGa
                                    const BiasGaussian& after) {
   velocity_scale_.learn(exceeding);
   last_velocity_s_ = time_s;
-  corrections_ += after.mean.head<2>() - before.mean.head<2>();
+  track_.correct(before.mean.head<2>(), after.mean.head<2>());
 }
 
 void FixStatistics::learn_fix(double time_s, double exceeding) {
@@ -92,20 +91,17 @@ void FixStatistics::learn_fix(double time_s, double exceeding) {
 void FixStatistics::compare_with_odometry(const FixMeasurement& fix, const BiasGaussian& before,
                                           const BiasGaussian& after) {
   FixNoiseModel& noise = of_ranges_ ? range_noise_ : noise_;
-  const double walk = parameters_.odometry.position_walk;
-  DeadReckonedFix beside;
-  beside.place = transform_point(before.pose(), fix.antenna_in_body) - corrections_;
-  beside.misfit = fix.position - beside.place;
-  beside.covariance =
+  const Eigen::Matrix2d declared =
       of_ranges_ ? Eigen::Matrix2d(fix.covariance / noise.scale()) : parameters_.fix.direct_covariance(fix.covariance);
-  beside.walk_m2 = walk * walk * travel_.duration_s;
-  beside.heading_sigma_rad = std::sqrt(before.covariance(kYaw, kYaw));
-  beside.time_s = fix.time_s;
-  beside.way_m = travel_.distance_m;
-  noise.compare(beside);
-  corrections_ += after.mean.head<2>() - before.mean.head<2>();
-  const double declared_m2 = 0.5 * beside.covariance.trace();
-  common_variance_m2_ = parameters_.common_error.variance_m2(noise.scale() * declared_m2, declared_m2, of_ranges_);
+  noise.compare(track_.beside(fix.position, declared, transform_point(before.pose(), fix.antenna_in_body),
+                              std::sqrt(before.covariance(kYaw, kYaw)), parameters_.odometry.position_walk,
+                              fix.time_s));
+  track_.correct(before.mean.head<2>(), after.mean.head<2>());
+  const double declared_m2 = 0.5 * declared.trace();
+  const CommonErrorParameters& common = parameters_.common_error;
+  common_variance_m2_ =
+      common.variance_m2(noise.scale() * declared_m2, declared_m2,
+                         of_ranges_ ? parameters_.range_common_error_share : common.common_error_share);
 }
 
 }  // namespace urban_gnss

@@ -1,9 +1,11 @@
 #pragma once
 
 #include "urban_gnss_localization/common/parameters.hpp"
+#include "urban_gnss_localization/gnss/common_error.hpp"
+#include "urban_gnss_localization/gnss/correlated_errors.hpp"
 #include "urban_gnss_localization/localizers/kim/bias_detector.hpp"
 #include "urban_gnss_localization/localizers/kim/fix_noise_monitor.hpp"
-#include "urban_gnss_localization/motion/odometry_errors.hpp"
+#include "urban_gnss_localization/motion/odometry_quality.hpp"
 
 namespace urban_gnss {
 
@@ -24,6 +26,10 @@ EnumNames<LockoutPolicy> enum_names(LockoutPolicy);
 /// The Sigma_v of Kim et al.: 0.02 of the speed and 0.03 of the yaw rate, per sqrt(Hz).
 MotionParameters kim_motion();
 
+/// An odometry of the middle level, beside kim_motion(). Below 1e-4 rad/s the wheels do not turn the robot: the limit
+/// of 0.01 rad/s, which a gyroscope may show at a standstill, would be too large here.
+OdometryErrorParameters kim_odometry_errors();
+
 struct ComplementaryEkfParameters {
   ComplementaryMode mode{ComplementaryMode::kCompensated};
   bool adapt_every_mode{true};
@@ -40,9 +46,9 @@ struct ComplementaryEkfParameters {
   bool estimate_odometry_errors{true};
   BiasDetectorParameters detector;
   FixNoiseParameters fix_noise;
-  /// Below 1e-4 rad/s the wheels do not turn the robot. The limit of 0.01 rad/s, which a gyroscope may show at a
-  /// standstill, would be too large here.
-  OdometryErrorParameters odometry{1.0, 0.02, 2e-4, 0.005, 3e-5, 0.05, 0.003, 0.0, 1e-4};
+  ErrorCorrelation errors{kFixErrors};
+  CommonErrorParameters common_error;
+  OdometryErrorParameters odometry = kim_odometry_errors();
   MotionParameters motion = kim_motion();
 
   void visit(ParameterVisitor& v) {
@@ -76,9 +82,15 @@ struct ComplementaryEkfParameters {
       "whether speed scale and yaw-rate bias are states; false: the paper's (x, y, heading)");
     v.group("detector", detector, "Detection of a biased fix.");
     v.group("fix_noise", fix_noise, "Noise of the fixes, estimated from the fixes.");
+    v.group("error_correlation", errors, "How long errors of fixes last at least, where the noise is adapted.");
+    v.group("common_error", common_error, "Error that fixes share for a whole drive, which no filter can see.");
     v.group("odometry", odometry, "Errors of the odometry.");
     v.group("motion", motion, "Noise of the motion, Nishida et al. eq. (5) to (8).");
   }
 };
+
+/// For the paper's own experiment: an odometry that does not wander, and errors of fixes that last as long as
+/// FixNoiseMonitor finds, with none that they share.
+ComplementaryEkfParameters published_complementary_ekf();
 
 }  // namespace urban_gnss

@@ -45,10 +45,15 @@ class FixNoiseMonitor {
 
   /// Factor on the declared covariance for estimation, at least 1; 1 until there are enough fixes.
   double inflation() const;
+  /// Factor on the declared covariance that gives the size of the errors, however long they last; 1 until there are
+  /// enough fixes.
+  double size() const;
   double near() const { return near_.mean; }
   double far() const { return far_.mean; }
 
  private:
+  bool is_ready() const;
+
   struct Fix {
     Eigen::Vector2d residual;  ///< fix minus dead reckoning, m
     Eigen::Vector2d place;     ///< dead-reckoned, m

@@ -4,9 +4,11 @@
 #include <optional>
 
 #include "urban_gnss_localization/common/parameters.hpp"
+#include "urban_gnss_localization/gnss/common_error.hpp"
+#include "urban_gnss_localization/gnss/fix_noise_model.hpp"
 #include "urban_gnss_localization/localizers/localizer.hpp"
 #include "urban_gnss_localization/localizers/maier/unscented.hpp"
-#include "urban_gnss_localization/motion/odometry_errors.hpp"
+#include "urban_gnss_localization/motion/odometry_quality.hpp"
 
 namespace urban_gnss {
 
@@ -23,9 +25,9 @@ struct UkfParameters {
   double student_dof{1.0};
   double gate_probability{0.99};
   double gate_timeout{5.0};
-  double fix_correlation_time{1.0};
-  /// All noise of the odometry is in the motion model, as in the paper.
-  OdometryErrorParameters odometry{0.1, 0.03, 2e-4, 0.005, 3e-5, 0.0, 0.0, 0.03};
+  FixNoiseModelParameters fix_noise;
+  CommonErrorParameters common_error;
+  OdometryErrorParameters odometry = middle_quality();
   double ukf_alpha{0.5};
   double ukf_beta{2.0};
   double ukf_kappa{0.0};
@@ -39,8 +41,8 @@ struct UkfParameters {
       "probability that a good fix is not classified as an outlier; 1: no fix is");
     v("gate_timeout", gate_timeout, positive(), "s",
       "time with nothing but rejected fixes after which the filter restarts on the fix (gate)");
-    v("fix_correlation_time", fix_correlation_time, non_negative(), "s",
-      "correlation time of the errors of fixes; 0: independent errors");
+    v.group("fix_noise", fix_noise, "Noise of the fixes relative to their declared covariance.");
+    v.group("common_error", common_error, "Error that fixes share for a whole drive, which no filter can see.");
     v.group("odometry", odometry, "Errors of the odometry, which the filter estimates.");
     v("ukf_alpha", ukf_alpha, between(1e-3, 1.0), "", "spread alpha of the sigma points");
     v("ukf_beta", ukf_beta, non_negative(), "",
@@ -48,6 +50,10 @@ struct UkfParameters {
     v("ukf_kappa", ukf_kappa, non_negative(), "", "secondary spread kappa of the sigma points");
   }
 };
+
+/// As the paper has it: fixes are what they declare, with independent errors but for a second; all noise of the
+/// odometry is in the motion model.
+UkfParameters published_ukf();
 
 /// The unscented Kalman filter of Maier and Kleiner 2010, section III-A: x_t = g(x_{t-1}, u_{t-1}) + noise, eq. (1),
 /// z_t = h(x_t) + noise, eq. (2), with the scaled unscented transform.
@@ -59,10 +65,10 @@ struct UkfParameters {
 /// and cannot tell a constant error from motion; s and b are slow random walks.
 ///
 /// Motion: the noise of Nishida et al. (5)-(7) enters as three more dimensions of the transform (move_noisily()).
-/// Fix: h is the antenna's position, lever arm included. The innovation's NIS is of the fix's own covariance; for the
-/// update, that is multiplied by (1 + a) / (1 - a), a = exp(-interval / fix_correlation_time), since errors of a
-/// first-order Markov process carry less information than independent ones, and divided by the weight of the Student-t
-/// distribution, min(1, (dof + 2) / (dof + NIS)).
+/// Fix: h is the antenna's position, lever arm included. The innovation's NIS is of the fix's covariance by
+/// FixNoiseModel; for the update, that is multiplied by correlation_inflation(), since errors that last carry less
+/// information than independent ones, and divided by the weight of the Student-t distribution, min(1, (dof + 2) / (dof
+/// + NIS)). The published covariance holds the error that all fixes share, too.
 ///
 /// Yaws are averaged as differences from the central point that are never wrapped, which is the mean on the circle and
 /// has no ambiguity. Its standard deviation is kept at or below that of an unknown yaw, pi / sqrt(3).
@@ -89,7 +95,7 @@ class Ukf : public Localizer {
   /// kRejectedNonFinite for a fix that is not finite or has no positive definite covariance.
   FixOutcome correct(const FixMeasurement& fix) override;
   Pose2 pose() const override { return {state_[0], state_[1], state_[2]}; }
-  PoseEstimate estimate() const override { return {pose(), covariance_.topLeftCorner<3, 3>()}; }
+  PoseEstimate estimate() const override;
   LocalizerHealth health() const override;
 
   double speed_scale() const { return state_[3]; }
@@ -108,7 +114,8 @@ class Ukf : public Localizer {
   Prediction predict(const Eigen::Vector2d& antenna_in_body) const;
   /// Whether the gate rejected the fix, or restarted on it.
   bool is_settled_by_gate(const FixMeasurement& fix, const Eigen::Vector2d& innovation, FixOutcome& outcome);
-  double correlation_inflation(double time_s) const;
+  /// Lets the noise model see a fix of the declared covariance (m^2) that was taken; `antenna` (m) and `before` it.
+  void learn(const FixMeasurement& declared, double nis, const Eigen::Vector2d& antenna, const State& before);
   /// Takes over a new state; refuses one that is not finite.
   bool accept(State state, Covariance covariance);
 
@@ -119,7 +126,9 @@ class Ukf : public Localizer {
   double nis_threshold_;
   State state_{State::Zero()};
   Covariance covariance_{Covariance::Identity()};
-  std::optional<double> last_used_s_;  ///< time of the last fix that was used
+  FixNoiseModel noise_;
+  DeadReckonedTrack track_;
+  double common_variance_m2_{0.0};  ///< per axis
   std::optional<double> rejected_since_s_;
 };
 

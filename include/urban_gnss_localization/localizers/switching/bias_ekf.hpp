@@ -1,53 +1,23 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <limits>
 #include <string>
 #include <vector>
 
+#include "urban_gnss_localization/gnss/common_error.hpp"
+#include "urban_gnss_localization/gnss/fix_noise_model.hpp"
 #include "urban_gnss_localization/gnss/fix_sigma.hpp"
 #include "urban_gnss_localization/gnss/range_fix.hpp"
 #include "urban_gnss_localization/localizers/localizer.hpp"
 #include "urban_gnss_localization/localizers/switching/bias_modes.hpp"
-#include "urban_gnss_localization/localizers/switching/fix_noise_model.hpp"
 #include "urban_gnss_localization/localizers/switching/velocity_noise.hpp"
 #include "urban_gnss_localization/motion/dead_reckoning.hpp"
 #include "urban_gnss_localization/motion/odometry_quality.hpp"
 
 namespace urban_gnss {
-
-/// The error that all fixes of a drive share (atmosphere, orbits, antenna): as large as a share of what the fixes' own
-/// errors are learnt to be. It is no state: it is added to the covariance that is published.
-struct CommonErrorParameters {
-  double common_error_share{0.7};
-  double range_common_error_share{0.4};
-  double common_error_min{0.7};
-  double common_error_max{4.0};
-
-  void visit(ParameterVisitor& v) {
-    v("common_error_share", common_error_share, non_negative(), "",
-      "standard deviation of the common error relative to that of a fix");
-    v("range_common_error_share", range_common_error_share, non_negative(), "",
-      "standard deviation of the common error relative to that of a fix which is solved from its ranges");
-    v("common_error_min", common_error_min, non_negative(), "m per axis",
-      "least standard deviation of the common error, but no more than what a fix declares");
-    v("common_error_max", common_error_max, non_negative(), "m per axis",
-      "greatest standard deviation of the common error");
-  }
-  void check(std::vector<std::string>& faults) const {
-    if (common_error_min > common_error_max) faults.push_back("common_error_min: must not exceed common_error_max");
-  }
-  /// m^2 per axis, where fixes have `fix_variance_m2` per axis and declare `declared_m2`.
-  double variance_m2(double fix_variance_m2, double declared_m2, bool of_ranges) const {
-    const double share = of_ranges ? range_common_error_share : common_error_share;
-    const double least = std::min(common_error_min, std::sqrt(declared_m2));
-    const double sigma_m = std::clamp(share * std::sqrt(fix_variance_m2), least, common_error_max);
-    return sigma_m * sigma_m;
-  }
-};
 
 /// The model of odometry and receiver that the filters of the switching bias share.
 struct SwitchingModelParameters {
@@ -60,6 +30,7 @@ struct SwitchingModelParameters {
   OdometryQualityParameters quality;
   double yaw_rate_scale_sigma{0.005};
   CommonErrorParameters common_error;
+  double range_common_error_share{0.4};
 
   void visit(ParameterVisitor& v) {
     v.include(fix);
@@ -72,6 +43,8 @@ struct SwitchingModelParameters {
     v.group("odometry_quality", quality, "How far the odometry wanders, which the filter learns.");
     v("yaw_rate_scale_sigma", yaw_rate_scale_sigma, non_negative(), "",
       "standard deviation of the odometry's relative yaw-rate error, a constant");
+    v("range_common_error_share", range_common_error_share, non_negative(), "",
+      "standard deviation of the common error relative to that of a fix which is solved from its ranges");
     v.group("common_error", common_error, "Error that fixes share for a whole drive, which no filter can see.");
   }
 };

@@ -6,8 +6,8 @@
 #include "urban_gnss_localization/gnss/correlated_errors.hpp"
 #include "urban_gnss_localization/gnss/nominal_cn0.hpp"
 #include "urban_gnss_localization/localizers/switching/bias_ekf.hpp"
-#include "urban_gnss_localization/localizers/switching/fix_noise_model.hpp"
-#include "urban_gnss_localization/localizers/switching/learnt_scale.hpp"
+#include "urban_gnss_localization/gnss/fix_noise_model.hpp"
+#include "urban_gnss_localization/gnss/learnt_scale.hpp"
 #include "urban_gnss_localization/motion/standstill.hpp"
 
 namespace urban_gnss {
@@ -68,8 +68,7 @@ class FixStatistics {
   LearntScale velocity_scale_;
   std::optional<double> last_fix_s_;
   std::optional<double> last_velocity_s_;
-  Travel travel_;                                         ///< of odometry since the start
-  Eigen::Vector2d corrections_{Eigen::Vector2d::Zero()};  ///< m, what fixes and velocities have moved the position by
+  DeadReckonedTrack track_;  ///< since the start
   double common_variance_m2_{0.0};
 };
 

@@ -1,7 +1,7 @@
 #pragma once
 
 #include "urban_gnss_localization/common/parameters.hpp"
-#include "urban_gnss_localization/localizers/switching/learnt_scale.hpp"
+#include "urban_gnss_localization/gnss/learnt_scale.hpp"
 
 namespace urban_gnss {
 

@@ -7,7 +7,7 @@
 
 #include "urban_gnss_localization/common/parameters.hpp"
 #include "urban_gnss_localization/gnss/correlated_errors.hpp"
-#include "urban_gnss_localization/localizers/switching/learnt_scale.hpp"
+#include "urban_gnss_localization/gnss/learnt_scale.hpp"
 #include "urban_gnss_localization/motion/standstill.hpp"
 
 namespace urban_gnss {
@@ -48,6 +48,24 @@ struct DeadReckonedFix {
   double heading_sigma_rad{0.0};
   double time_s{0.0};
   double way_m{0.0};  ///< since the start
+};
+
+/// The odometry alone since the start, beside a filter whose position measurements move.
+class DeadReckonedTrack {
+ public:
+  void move(const Twist2& twist, double duration_s) { travel_.add(twist, duration_s); }
+  /// A measurement has moved the filter's position (m).
+  void correct(const Eigen::Vector2d& before, const Eigen::Vector2d& after) { corrections_ += after - before; }
+  /// A fix at `time_s` with `position` (m) and the declared `covariance` (m^2) beside the odometry; before the filter
+  /// takes it, which predicts the antenna at `antenna` (m). `position_walk`: m/sqrt(s).
+  DeadReckonedFix beside(const Eigen::Vector2d& position, const Eigen::Matrix2d& covariance,
+                         const Eigen::Vector2d& antenna, double heading_sigma_rad, double position_walk,
+                         double time_s) const;
+  const Travel& travel() const { return travel_; }
+
+ private:
+  Travel travel_;
+  Eigen::Vector2d corrections_{Eigen::Vector2d::Zero()};  ///< m, what measurements have moved the position by
 };
 
 /// The effective noise of a fix. The covariance that its receiver declares rises and falls with its errors, but is too

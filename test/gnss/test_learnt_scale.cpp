@@ -4,7 +4,7 @@
 
 #include "urban_gnss_localization/common/random.hpp"
 #include "urban_gnss_localization/gnss/chi_squared.hpp"
-#include "urban_gnss_localization/localizers/switching/learnt_scale.hpp"
+#include "urban_gnss_localization/gnss/learnt_scale.hpp"
 
 namespace urban_gnss {
 namespace {

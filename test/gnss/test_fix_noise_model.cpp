@@ -4,7 +4,7 @@
 
 #include "matchers.hpp"
 #include "urban_gnss_localization/common/random.hpp"
-#include "urban_gnss_localization/localizers/switching/fix_noise_model.hpp"
+#include "urban_gnss_localization/gnss/fix_noise_model.hpp"
 
 namespace urban_gnss {
 namespace {

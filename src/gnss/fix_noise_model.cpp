@@ -1,4 +1,4 @@
-#include "urban_gnss_localization/localizers/switching/fix_noise_model.hpp"
+#include "urban_gnss_localization/gnss/fix_noise_model.hpp"
 
 #include <Eigen/Dense>
 #include <algorithm>
@@ -21,6 +21,20 @@ const double kMostTempered = std::log(4.0);
 double log_variance(const Eigen::Matrix2d& covariance) { return 0.5 * std::log(covariance.determinant()); }
 
 }  // namespace
+
+DeadReckonedFix DeadReckonedTrack::beside(const Eigen::Vector2d& position, const Eigen::Matrix2d& covariance,
+                                          const Eigen::Vector2d& antenna, double heading_sigma_rad,
+                                          double position_walk, double time_s) const {
+  DeadReckonedFix fix;
+  fix.place = antenna - corrections_;
+  fix.misfit = position - fix.place;
+  fix.covariance = covariance;
+  fix.walk_m2 = position_walk * position_walk * travel_.duration_s;
+  fix.heading_sigma_rad = heading_sigma_rad;
+  fix.time_s = time_s;
+  fix.way_m = travel_.distance_m;
+  return fix;
+}
 
 void FixNoiseModel::reset() {
   scale_ = fresh_scale();
