@@ -31,6 +31,16 @@ void ParticleSet::draw_gaussian(const PoseEstimate& start, RandomEngine& engine)
   set_equal_weights();
 }
 
+void ParticleSet::spread(double position_m2, double heading_rad2, RandomEngine& engine) {
+  const double position_m = std::sqrt(position_m2);
+  const double heading_rad = std::sqrt(heading_rad2);
+  for (std::size_t i = 0; i < size(); ++i) {
+    x[i] += position_m * draw_normal(engine);
+    y[i] += position_m * draw_normal(engine);
+    yaw[i] = wrap_angle(yaw[i] + heading_rad * draw_normal(engine));
+  }
+}
+
 void ParticleSet::set_equal_weights() {
   if (size() == 0) return;
   const double share = 1.0 / static_cast<double>(size());

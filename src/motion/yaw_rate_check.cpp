@@ -30,7 +30,8 @@ std::optional<double> YawRateCheck::add(double odometry_radps, double imu_radps,
 YawRateFault YawRateArbiter::add(double odometry_radps, double imu_radps, double duration_s) {
   const double slower_radps = std::min(std::abs(odometry_radps), std::abs(imu_radps));
   const bool was_wrong = fault_ != YawRateFault::kNone;
-  const double limit_radps = was_wrong ? kEnd_radps + kEndShare * slower_radps : kBegin_radps + kBeginShare * slower_radps;
+  const double limit_radps =
+      was_wrong ? kEnd_radps + kEndShare * slower_radps : kBegin_radps + kBeginShare * slower_radps;
   if (std::abs(imu_radps - odometry_radps) <= limit_radps) {
     if (!agreement_ || was_wrong) agreement_ = {odometry_radps, imu_radps};
     const double rate = 1.0 - std::exp(-duration_s / kMemory_s);

@@ -14,7 +14,7 @@ namespace {
 constexpr double kGlitchHold_s = 2.0;
 constexpr double kLeastJump_mps = 1.0;  ///< below it, quantised wheels jump by themselves
 constexpr double kMoving_mps = 0.5;
-constexpr double kReceiverHold_s = 2.5;    ///< for which a speed of the receiver is used
+constexpr double kReceiverHold_s = 2.5;  ///< for which a speed of the receiver is used
 /// A change of the odometry's speed in one step that is likely to be a fault.
 constexpr double kJump_mps = 0.3;
 constexpr double kJumpShare = 0.33;

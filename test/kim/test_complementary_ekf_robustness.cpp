@@ -223,10 +223,10 @@ std::string trace(const std::string& yaml) {
   text.precision(17);
   const auto drive_through = [&](const std::string& mode) {
     const YAML::Node node = YAML::Load(yaml);
-    // As by default, of what the paper's experiment has no use for.
+    // With what the paper's experiment has no use for.
     YAML::Node merged = YAML::Load(
-        "{correlation_distance: 15.0, correlation_time: 40.0, common_error_share: 0.7, common_error_min: 0.7, "
-        "common_error_max: 1.2}");
+        "{correlation_distance: 1.0, correlation_time: 3.0, common_error_share: 0.7, common_error_min: 0.7, "
+        "common_error_max: 1.2, reacquisition_gap: 5.0, reacquisition_sigma: 20.0}");
     if (!mode.empty()) merged["mode"] = mode;
     for (const auto& entry : node) merged[entry.first.as<std::string>()] = entry.second;
     YAML::Emitter out;
@@ -234,8 +234,8 @@ std::string trace(const std::string& yaml) {
     Drive drive(8, out.c_str());
     const auto note = [&](const FixMeasurement&) {
       text << drive.filter.pose().x << ' ' << drive.filter.smallest_detectable_jump_m() << ' '
-           << drive.filter.error_covariance()(2, 2) << ' ' << drive.filter.estimate().covariance(0, 0) << ' ' << to_string(drive.last.decision) << drive.last.reason
-           << drive.filter.is_gate_inert() << '\n';
+           << drive.filter.error_covariance()(2, 2) << ' ' << drive.filter.estimate().covariance(0, 0) << ' '
+           << to_string(drive.last.decision) << drive.last.reason << drive.filter.is_gate_inert() << '\n';
     };
     drive.run(60.0, note);
     for (const Eigen::Vector2d& bias : {Eigen::Vector2d(15.0, 0.0), Eigen::Vector2d(0.0, -30.0)}) {
@@ -290,6 +290,8 @@ TEST(ComplementaryEkfParameters, EachHasAnEffect) {
       other = "0.09";
     } else if (name.rfind("common_error", 0) == 0) {
       other = name == "common_error_min" ? "0.9" : "1.0";
+    } else if (name == "reacquisition_gap") {
+      other = "90.0";
     } else if (name.rfind("correlation_", 0) == 0) {
       other = "90.0";
     } else if (name == "fix_noise_max_inflation") {

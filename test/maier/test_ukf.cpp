@@ -197,6 +197,35 @@ TEST(Ukf, DefaultsAreNotOverconfidentInTheOpen) {
   EXPECT_GT(mean, 0.9);
 }
 
+// A receiver that declares 5 m and is good to 0.5 m, and one that declares 1 m and is good to 8 m; errors last 20 s.
+TEST(Ukf, LearnsHowGoodFixesAre) {
+  for (const auto& [declared_m, sigma_m] : {std::pair{5.0, 0.5}, {1.0, 8.0}}) {
+    double nees = 0.0;
+    constexpr int kSeeds = 20;
+    for (int seed = 0; seed < kSeeds; ++seed) {
+      RandomEngine engine = make_engine(seed, 9);
+      Ukf ukf(UkfParameters(), {});
+      Pose2 truth;
+      ukf.initialize(pose_with_sigma(truth, 1.0, 0.1));
+      Eigen::Vector2d error(sigma_m * draw_normal(engine), sigma_m * draw_normal(engine));
+      const double kept = std::exp(-1.0 / 20.0);
+      for (int i = 1; i <= 6000; ++i) {
+        const Twist2 twist{1.5, 0.2 * std::sin(0.005 * i)};
+        truth = move(truth, twist, 0.1);
+        ukf.move(twist, 0.1);
+        if (i % 10 != 0) continue;
+        const Eigen::Vector2d fresh(draw_normal(engine), draw_normal(engine));
+        error = kept * error + sigma_m * std::sqrt(1.0 - kept * kept) * fresh;
+        ukf.correct(fix_at(truth.position() + error, declared_m, 0.1 * i));
+      }
+      const Eigen::Vector2d off = ukf.pose().position() - truth.position();
+      nees += off.dot(ukf.estimate().covariance.topLeftCorner<2, 2>().inverse() * off) / kSeeds;
+    }
+    EXPECT_LT(nees, 2.0 + 3.0 * std::sqrt(4.0 / kSeeds)) << declared_m << ' ' << sigma_m;
+    EXPECT_GT(nees, 0.05) << declared_m << ' ' << sigma_m;
+  }
+}
+
 TEST(Ukf, LearnsSpeedScaleAndYawRateBias) {
   RandomEngine engine = make_engine(5);
   Ukf ukf(published_ukf(), {});

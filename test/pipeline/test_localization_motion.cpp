@@ -108,8 +108,10 @@ TEST(LocalizationMotion, VelocitiesAreTheSameAfterAClockThatWasSetBack) {
 TEST(LocalizationMotion, VelocitiesAreForThoseWhoWantThem) {
   for (const bool use : {true, false}) {
     for (const bool takes : {true, false}) {
-      Rig rig(std::string("{datum: [33.0, 130.0, 20.0], initial_pose: [0.0, 0.0, 0.0], check_wheels: false, use_gps_velocity: ") +
-              (use ? "true}" : "false}"));
+      Rig rig(
+          std::string(
+              "{datum: [33.0, 130.0, 20.0], initial_pose: [0.0, 0.0, 0.0], check_wheels: false, use_gps_velocity: ") +
+          (use ? "true}" : "false}"));
       rig.fake->takes = takes;
       rig.run(0.0, 1.0, false);
       RawVelocity bad = Rig::velocity(0.3);

@@ -245,6 +245,23 @@ TEST(ImmEkf, SurvivesALongOutageAndALateFix) {
   }
 }
 
+// Fixes 1 m aside, after 40 s under a roof.
+TEST(ImmEkf, FirstFixesAfterAGapMoveItLess) {
+  const auto moved_m = [](const std::string& yaml) {
+    ImmEkf imm = make(yaml);
+    drive(imm, {});
+    for (int k = 0; k < 400; ++k) imm.move({1.5, 0.0}, 0.1);
+    const Eigen::Vector2d before = imm.pose().position();
+    for (int k = 0; k < 3; ++k) imm.correct(fix_of(before + Eigen::Vector2d(0.0, 1.0), 0.5, 160.0 + 10.0 * k));
+    return (imm.pose().position() - before).norm();
+  };
+  const double with_doubt = moved_m("{reacquisition_sigma: 40.0}");
+  EXPECT_LT(with_doubt, 0.5 * moved_m("{reacquisition_sigma: 0.0}"));
+  EXPECT_LT(with_doubt, moved_m("{reacquisition_sigma: 10.0}"));
+  EXPECT_GT(moved_m("{reacquisition_sigma: 40.0, reacquisition_gap: 60.0}"), 2.0 * with_doubt) << "no gap";
+  EXPECT_GT(moved_m("{reacquisition_sigma: 40.0, reacquisition_time: 3.0}"), 1.2 * with_doubt) << "soon forgotten";
+}
+
 TEST(ImmEkf, CommutesWithRotationAndTranslation) {
   const Pose2 frame{300.0, -200.0, 2.5};
   SwitchingDrive here, there;
@@ -288,7 +305,8 @@ TEST(ImmEkf, EveryParameterHasAnEffect) {
   const std::vector<ParameterChange> changes = switching_model_changes();
   // Elsewhere: parked_walk, fix_covariance_weight, the common error's, the velocity's and the ranges'.
   EXPECT_EQ(changes.size() + 3 + parameter_names(CommonErrorParameters{}).size() +
-                parameter_names(VelocityNoiseParameters{}).size() + parameter_names(RangeFixParameters{}).size(),
+                parameter_names(ReacquisitionParameters{}).size() + parameter_names(VelocityNoiseParameters{}).size() +
+                parameter_names(RangeFixParameters{}).size(),
             parameter_names(ImmEkfParameters{}).size());
   SwitchingDrive d;
   d.bias = bias_between(20.0, 40.0, {4.0, 3.0});

@@ -290,7 +290,7 @@ TEST(SwitchingParticleFilter, EveryParameterHasAnEffect) {
   // Those of a parked robot, of changing declarations, and of the covariance alone; elsewhere,
   // those of ranges.
   EXPECT_EQ(changes.size() + 3 + parameter_names(CommonErrorParameters{}).size() +
-                parameter_names(RangeFixParameters{}).size(),
+                parameter_names(ReacquisitionParameters{}).size() + parameter_names(RangeFixParameters{}).size(),
             parameter_names(SwitchingParticleFilterParameters{}).size());
   SwitchingDrive d;
   d.bias = bias_between(10.0, 20.0, {4.0, 3.0});

@@ -28,6 +28,9 @@ struct ParticleSet {
   /// an unknown heading and draws it uniformly. Only the lower triangle of the covariance is read; it may be singular.
   void draw_gaussian(const PoseEstimate& start, RandomEngine& engine);
 
+  /// Moves every particle by independent Gaussian draws with these variances (m^2 per axis, rad^2).
+  void spread(double position_m2, double heading_rad2, RandomEngine& engine);
+
   void set_equal_weights();
 
   /// Scales the weights to sum 1 and fills `weight`. False where no weight is positive and finite; the weights are

@@ -26,10 +26,10 @@ struct SpeedPair {
 
 /// Compares an odometry's speed with the receiver's for what goes wrong with wheels. A reflection can spoil a
 /// receiver's velocity for seconds, and by any amount. So a fault counts only where it has the pattern of one, for as
-/// long as no reflection keeps that pattern: 1.5 s reversed, 4 s dead or scaled by 1.8 and more, 10 s scaled by less; a scale
-/// half as long where it began with a jump of the odometry.
-/// The receiver's speed, or its mean ratio to the odometry's, must be steady, and no robot turns back without a stop, unless it is the odometry whose sign
-/// changes. A fault ends once both agree for 1.5 s while the robot moves. A silence of 2.5 s begins anew.
+/// long as no reflection keeps that pattern: 1.5 s reversed, 4 s dead or scaled by 1.8 and more, 10 s scaled by less; a
+/// scale half as long where it began with a jump of the odometry. The receiver's speed, or its mean ratio to the
+/// odometry's, must be steady, and no robot turns back without a stop, unless it is the odometry whose sign changes. A
+/// fault ends once both agree for 1.5 s while the robot moves. A silence of 2.5 s begins anew.
 class SpeedCheck {
  public:
   /// The fault as of this pair; stamps ascend.

@@ -41,7 +41,7 @@ struct Start {
   PoseEstimate estimate;  ///< base in the map frame, at the latest odometry
   std::string source;     ///< where it is from, for people
   bool has_heading{true};
-  bool is_told{false};  ///< somebody has set it: no fix and no motion stands behind it
+  bool is_told{false};                        ///< somebody has set it: no fix and no motion stands behind it
   std::string fix_use{"used for the start"};  ///< what became of the fix that made it possible
 };
 

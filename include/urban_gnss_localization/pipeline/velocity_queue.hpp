@@ -20,7 +20,8 @@ struct VelocityParameters {
   double velocity_sigma_floor{0.05};
 
   void visit(ParameterVisitor& v) {
-    v("use_gps_velocity", use_gps_velocity, "whether gps/velocity is subscribed: for localizers that can use it, and to check the odometry's speed");
+    v("use_gps_velocity", use_gps_velocity,
+      "whether gps/velocity is subscribed: for localizers that can use it, and to check the odometry's speed");
     v("velocity_sigma_default", velocity_sigma_default, positive(), "m/s per axis",
       "standard deviation of a velocity for which the receiver declares no covariance");
     v("velocity_sigma_floor", velocity_sigma_floor, positive(), "m/s per axis",

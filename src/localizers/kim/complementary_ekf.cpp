@@ -26,6 +26,7 @@ ComplementaryEkf::ComplementaryEkf(const ComplementaryEkfParameters& parameters)
     : parameters_(parameters),
       detector_(parameters.detector),
       noise_monitor_(parameters.fix_noise),
+      reacquisition_(parameters.reacquisition),
       close_threshold_(chi_squared_quantile(parameters.close_probability, kFixDof)),
       spike_threshold_(2.0 * detector_.threshold()) {  // of two degrees of freedom: the false alarms of false alarms
   if (!parameters_.estimate_odometry_errors) parameters_.odometry = without_odometry_errors(parameters_.odometry);
@@ -43,6 +44,7 @@ void ComplementaryEkf::initialize(const PoseEstimate& start) {
   path_variance_m2_ = 0.0;
   is_open_ = false;
   had_fix_ = false;
+  reacquisition_ = Reacquisition(parameters_.reacquisition);
   common_variance_m2_ = 0.0;
   insignificant_ = 0;
   is_inert_ = false;
@@ -99,7 +101,9 @@ FixOutcome ComplementaryEkf::correct(const FixMeasurement& fix) {
   innovation.observation.leftCols<2>().setIdentity();
   innovation.observation.col(2) << -lever.y(), lever.x();
   innovation.declared = fix.covariance;
-  innovation.noise = noise_inflation() * fix.covariance;
+  if (is_adaptive()) innovation.declared.diagonal().array() += reacquisition_.variance_m2(fix.time_s);
+  reacquisition_.add(fix.time_s);
+  innovation.noise = noise_inflation() * innovation.declared;
   innovation.time_s = fix.time_s;
 
   if (is_open_) {

@@ -32,6 +32,7 @@ OdometryErrorParameters kim_odometry_errors() {
 ComplementaryEkfParameters published_complementary_ekf() {
   ComplementaryEkfParameters p;
   p.errors = {0.0, 0.0};
+  p.reacquisition.reacquisition_sigma = 0.0;
   p.common_error = {0.0, 0.0, 0.0};
   p.odometry = {1.0, 0.02, 2e-4, 0.005, 3e-5, 0.05, 0.003, 0.0, 1e-4};
   return p;

@@ -45,6 +45,7 @@ UkfParameters published_ukf() {
   p.fix_noise.fix_covariance_weight = 1.0;
   p.fix_noise.fix_scale_lag = 0.0;
   p.fix_noise.errors = {0.0, 1.0};
+  p.reacquisition.reacquisition_sigma = 0.0;
   p.common_error = {0.0, 0.0, 0.0};
   p.odometry = {0.1, 0.03, 2e-4, 0.005, 3e-5, 0.0, 0.0, 0.03};
   return p;
@@ -58,7 +59,8 @@ Ukf::Ukf(const UkfParameters& parameters, const MotionParameters& motion)
       fix_weights_(UnscentedWeights::of(kDimension, parameters.ukf_alpha, parameters.ukf_beta, parameters.ukf_kappa)),
       nis_threshold_(parameters.gate_probability < 1.0 ? chi_squared_quantile(parameters.gate_probability, kFixDof)
                                                        : std::numeric_limits<double>::infinity()),
-      noise_(parameters.fix_noise) {
+      noise_(parameters.fix_noise),
+      reacquisition_(parameters.reacquisition) {
   initialize({});
 }
 
@@ -71,6 +73,7 @@ void Ukf::initialize(const PoseEstimate& start) {
   limit_yaw_variance(covariance_);
   noise_.reset();
   track_ = {};
+  reacquisition_ = Reacquisition(parameters_.reacquisition);
   common_variance_m2_ = 0.0;
   rejected_since_s_.reset();
 }
@@ -177,6 +180,8 @@ FixOutcome Ukf::correct(const FixMeasurement& declared) {
   FixMeasurement fix = declared;
   const Eigen::Matrix2d effective = noise_.effective_covariance(declared.covariance);
   fix.covariance = noise_.scale() * effective;
+  fix.covariance.diagonal().array() += reacquisition_.variance_m2(declared.time_s);
+  reacquisition_.add(declared.time_s);
   const State before = state_;
   Prediction prediction = predict(fix.antenna_in_body);
   const Eigen::Vector2d innovation = fix.position - prediction.position;

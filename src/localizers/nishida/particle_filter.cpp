@@ -75,6 +75,10 @@ void ParticleFilter::move(const Twist2& twist, double duration_s) {
   turn_since_fix_ += twist.yaw_rate_radps * duration_s;
 }
 
+void ParticleFilter::doubt(const MotionDoubt& doubt) {
+  particles_.spread(doubt.position_m2, doubt.heading_rad2, engine_);
+}
+
 FixOutcome ParticleFilter::correct(const FixMeasurement& fix) {
   FixOutcome outcome;
   examine(fix, outcome);

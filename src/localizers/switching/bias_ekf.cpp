@@ -91,6 +91,7 @@ BiasEkfUpdate take_fix(BiasGaussian& state, BiasMode mode, const FixMeasurement&
     white =
         noise.scale * (is_direct ? p.fix.direct_covariance(fix.covariance) : p.fix.shadow_covariance(fix.covariance));
   }
+  white.diagonal().array() += noise.added_m2;
   const Eigen::Matrix2d hph = h * with_fix;
   BiasEkfUpdate update;
   update.white_nis = innovation.dot((hph + white).inverse() * innovation);

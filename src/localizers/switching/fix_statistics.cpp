@@ -25,11 +25,13 @@ FixStatistics::FixStatistics(const SwitchingModelParameters& parameters)
     : parameters_(parameters),
       noise_(parameters.noise),
       range_noise_(range_noise(parameters)),
+      reacquisition_(parameters.reacquisition),
       velocity_scale_(parameters.velocity.fresh_scale()) {}
 
 void FixStatistics::reset() {
   noise_.reset();
   range_noise_.reset();
+  reacquisition_ = Reacquisition(parameters_.reacquisition);
   nominal_cn0_.reset();
   of_ranges_ = false;
   velocity_scale_ = parameters_.velocity.fresh_scale();
@@ -85,6 +87,7 @@ void FixStatistics::learn_velocity(double time_s, double exceeding, const BiasGa
 
 void FixStatistics::learn_fix(double time_s, double exceeding) {
   (of_ranges_ ? range_noise_ : noise_).learn(time_s, exceeding);
+  reacquisition_.add(time_s);
   last_fix_s_ = time_s;
 }
 

@@ -128,6 +128,7 @@ class ComplementaryEkf : public Localizer {
   bool is_confirmed_{false};  ///< a fix after the opening agreed with the bias
   double last_fix_s_{0.0};
   bool had_fix_{false};
+  Reacquisition reacquisition_;
   double common_variance_m2_{0.0};  ///< per axis, of the error that all fixes share
   int insignificant_{0};
   bool is_inert_{false};

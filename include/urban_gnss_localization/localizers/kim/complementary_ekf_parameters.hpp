@@ -3,6 +3,7 @@
 #include "urban_gnss_localization/common/parameters.hpp"
 #include "urban_gnss_localization/gnss/common_error.hpp"
 #include "urban_gnss_localization/gnss/correlated_errors.hpp"
+#include "urban_gnss_localization/gnss/reacquisition.hpp"
 #include "urban_gnss_localization/localizers/kim/bias_detector.hpp"
 #include "urban_gnss_localization/localizers/kim/fix_noise_monitor.hpp"
 #include "urban_gnss_localization/motion/odometry_quality.hpp"
@@ -47,6 +48,7 @@ struct ComplementaryEkfParameters {
   BiasDetectorParameters detector;
   FixNoiseParameters fix_noise;
   ErrorCorrelation errors{kFixErrors};
+  ReacquisitionParameters reacquisition;
   CommonErrorParameters common_error;
   OdometryErrorParameters odometry = kim_odometry_errors();
   MotionParameters motion = kim_motion();
@@ -83,6 +85,7 @@ struct ComplementaryEkfParameters {
     v.group("detector", detector, "Detection of a biased fix.");
     v.group("fix_noise", fix_noise, "Noise of the fixes, estimated from the fixes.");
     v.group("error_correlation", errors, "How long errors of fixes last at least, where the noise is adapted.");
+    v.group("reacquisition", reacquisition, "The first fixes after a gap, where the noise is adapted.");
     v.group("common_error", common_error, "Error that fixes share for a whole drive, which no filter can see.");
     v.group("odometry", odometry, "Errors of the odometry.");
     v.group("motion", motion, "Noise of the motion, Nishida et al. eq. (5) to (8).");

@@ -6,6 +6,7 @@
 #include "urban_gnss_localization/common/parameters.hpp"
 #include "urban_gnss_localization/gnss/common_error.hpp"
 #include "urban_gnss_localization/gnss/fix_noise_model.hpp"
+#include "urban_gnss_localization/gnss/reacquisition.hpp"
 #include "urban_gnss_localization/localizers/localizer.hpp"
 #include "urban_gnss_localization/localizers/maier/unscented.hpp"
 #include "urban_gnss_localization/motion/odometry_quality.hpp"
@@ -26,6 +27,7 @@ struct UkfParameters {
   double gate_probability{0.99};
   double gate_timeout{5.0};
   FixNoiseModelParameters fix_noise;
+  ReacquisitionParameters reacquisition;
   CommonErrorParameters common_error;
   OdometryErrorParameters odometry = middle_quality();
   double ukf_alpha{0.5};
@@ -42,6 +44,7 @@ struct UkfParameters {
     v("gate_timeout", gate_timeout, positive(), "s",
       "time with nothing but rejected fixes after which the filter restarts on the fix (gate)");
     v.group("fix_noise", fix_noise, "Noise of the fixes relative to their declared covariance.");
+    v.group("reacquisition", reacquisition, "The first fixes after a gap.");
     v.group("common_error", common_error, "Error that fixes share for a whole drive, which no filter can see.");
     v.group("odometry", odometry, "Errors of the odometry, which the filter estimates.");
     v("ukf_alpha", ukf_alpha, between(1e-3, 1.0), "", "spread alpha of the sigma points");
@@ -66,8 +69,9 @@ UkfParameters published_ukf();
 ///
 /// Motion: the noise of Nishida et al. (5)-(7) enters as three more dimensions of the transform (move_noisily()).
 /// Fix: h is the antenna's position, lever arm included. The innovation's NIS is of the fix's covariance by
-/// FixNoiseModel; for the update, that is multiplied by correlation_inflation(), since errors that last carry less
-/// information than independent ones, and divided by the weight of the Student-t distribution, min(1, (dof + 2) / (dof
+/// FixNoiseModel and Reacquisition; for the update, that is multiplied by correlation_inflation(), since errors that
+/// last carry less information than independent ones, and divided by the weight of the Student-t distribution, min(1,
+/// (dof + 2) / (dof
 /// + NIS)). The published covariance holds the error that all fixes share, too.
 ///
 /// Yaws are averaged as differences from the central point that are never wrapped, which is the mean on the circle and
@@ -128,6 +132,7 @@ class Ukf : public Localizer {
   Covariance covariance_{Covariance::Identity()};
   FixNoiseModel noise_;
   DeadReckonedTrack track_;
+  Reacquisition reacquisition_;
   double common_variance_m2_{0.0};  ///< per axis
   std::optional<double> rejected_since_s_;
 };

@@ -83,6 +83,7 @@ class ParticleFilter : public ParticleLocalizer {
   bool wants_bias() const override { return parameters_.mode != ParticleFilterMode::kConventional; }
   void initialize(const PoseEstimate& start) override;
   void move(const Twist2& twist, double duration_s) override;
+  void doubt(const MotionDoubt& doubt) override;
   FixOutcome correct(const FixMeasurement& fix) override;
   /// The covariance is that of all particles about the pose, other clusters included.
   PoseEstimate estimate() const override { return {estimate_, covariance_about(particles_, estimate_)}; }

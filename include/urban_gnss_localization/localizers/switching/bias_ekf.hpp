@@ -11,6 +11,7 @@
 #include "urban_gnss_localization/gnss/fix_noise_model.hpp"
 #include "urban_gnss_localization/gnss/fix_sigma.hpp"
 #include "urban_gnss_localization/gnss/range_fix.hpp"
+#include "urban_gnss_localization/gnss/reacquisition.hpp"
 #include "urban_gnss_localization/localizers/localizer.hpp"
 #include "urban_gnss_localization/localizers/switching/bias_modes.hpp"
 #include "urban_gnss_localization/localizers/switching/velocity_noise.hpp"
@@ -29,6 +30,7 @@ struct SwitchingModelParameters {
   OdometryErrorParameters odometry;
   OdometryQualityParameters quality;
   double yaw_rate_scale_sigma{0.005};
+  ReacquisitionParameters reacquisition;
   CommonErrorParameters common_error;
   double range_common_error_share{0.4};
 
@@ -43,6 +45,7 @@ struct SwitchingModelParameters {
     v.group("odometry_quality", quality, "How far the odometry wanders, which the filter learns.");
     v("yaw_rate_scale_sigma", yaw_rate_scale_sigma, non_negative(), "",
       "standard deviation of the odometry's relative yaw-rate error, a constant");
+    v.group("reacquisition", reacquisition, "The first fixes after a gap.");
     v("range_common_error_share", range_common_error_share, non_negative(), "",
       "standard deviation of the common error relative to that of a fix which is solved from its ranges");
     v.group("common_error", common_error, "Error that fixes share for a whole drive, which no filter can see.");
@@ -115,6 +118,7 @@ struct BiasEkfUpdate {
 struct FixNoise {
   double scale{1.0};      ///< learnt
   double inflation{1.0};  ///< of correlated errors
+  double added_m2{0.0};   ///< a variance per axis beside it: Reacquisition
   bool of_ranges{false};  ///< the covariance is that of the fix's ranges, which use_fix_covariance does not concern
 };
 

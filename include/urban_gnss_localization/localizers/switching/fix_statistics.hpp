@@ -4,10 +4,10 @@
 #include <optional>
 
 #include "urban_gnss_localization/gnss/correlated_errors.hpp"
-#include "urban_gnss_localization/gnss/nominal_cn0.hpp"
-#include "urban_gnss_localization/localizers/switching/bias_ekf.hpp"
 #include "urban_gnss_localization/gnss/fix_noise_model.hpp"
 #include "urban_gnss_localization/gnss/learnt_scale.hpp"
+#include "urban_gnss_localization/gnss/nominal_cn0.hpp"
+#include "urban_gnss_localization/localizers/switching/bias_ekf.hpp"
 #include "urban_gnss_localization/motion/standstill.hpp"
 
 namespace urban_gnss {
@@ -34,8 +34,9 @@ class FixStatistics {
   /// m, of a range in line of sight, as learnt.
   double range_sigma_m() const;
   FixNoise fix_noise(double time_s) const {
-    if (of_ranges_) return {1.0, range_noise_.correlation_inflation(time_s), true};
-    return {noise_.scale(), noise_.correlation_inflation(time_s), false};
+    const double added_m2 = reacquisition_.variance_m2(time_s);
+    if (of_ranges_) return {1.0, range_noise_.correlation_inflation(time_s), added_m2, true};
+    return {noise_.scale(), noise_.correlation_inflation(time_s), added_m2, false};
   }
   /// Prior odds of a bias of the fix, against those of the parameters: bias_odds of mode_transition().
   double bias_odds() const { return of_ranges_ ? parameters_.ranges.range_bias_odds : 1.0; }
@@ -63,6 +64,7 @@ class FixStatistics {
   SwitchingModelParameters parameters_;
   FixNoiseModel noise_;
   FixNoiseModel range_noise_;
+  Reacquisition reacquisition_;
   NominalCn0 nominal_cn0_;
   bool of_ranges_{false};  ///< the last fix
   LearntScale velocity_scale_;
