@@ -43,6 +43,7 @@ LocalizationPipeline::LocalizationPipeline(const LocalizationParameters& paramet
       speed_(parameters.speed),
       velocities_(parameters.velocity),
       fixes_(parameters.input.fix_validation),
+      delay_(parameters.fix_delay),
       biases_(parameters.bias),
       start_(parameters.start),
       integrity_(parameters.integrity),
@@ -59,6 +60,7 @@ void LocalizationPipeline::reset(const std::string& why) {
   speed_.reset();
   velocities_.reset();
   fixes_.reset();
+  delay_ = FixDelayEstimator(parameters_.fix_delay);
   satellites_.reset();
   biases_.reset();
   start_.reset();
@@ -106,6 +108,7 @@ void LocalizationPipeline::forget_odometry(double gap_s) {
   event(Level::kWarn, "no odometry for " + seconds_text(gap_s) +
                           (initialized() ? ": place unknown, starting anew from the fixes" : ""));
   history_.clear();
+  delay_.forget_odometry();
   ++epoch_;
   start_.lose_place();
 }
@@ -141,7 +144,9 @@ void LocalizationPipeline::process_velocities() {
 }
 
 void LocalizationPipeline::process_velocity(const RawVelocity& velocity) {
-  const auto matched = match_velocity(velocity, history_, antenna_);
+  RawVelocity in_time = velocity;
+  in_time.stamp = undelayed(velocity.stamp);
+  const auto matched = match_velocity(in_time, history_, antenna_);
   if (!matched) {
     event(Level::kWarn, "velocity of the receiver left out: older than the odometry that is remembered");
     return;
@@ -213,10 +218,12 @@ void LocalizationPipeline::process_fixes() {
 bool LocalizationPipeline::process_next_fix() {
   const ValidatedFix* next = fixes_.next();
   if (next == nullptr || history_.empty() || next->fix.stamp > history_.latest()) return false;
-  const bool is_too_old = next->fix.stamp < history_.oldest();
+  const bool is_too_old = undelayed(next->fix.stamp) < history_.oldest();
   if (!is_too_old && initialized() && awaits_more(next->fix.stamp)) return false;
 
   const ValidatedFix fix = fixes_.pop();
+  delay_.add(fix.fix.stamp, fix.fix.position, history_, antenna_);
+  if (const auto news = delay_.take_news()) event(Level::kInfo, *news);
   if (is_too_old) {
     decide_stale(fix.outcome, "older than the odometry that is remembered");
     return true;
@@ -273,7 +280,8 @@ void LocalizationPipeline::correct_with(const ValidatedFix& fix) {
   FixMeasurement measurement;
   measurement.position = fix.fix.position;
   measurement.covariance = fix.fix.covariance;
-  measurement.antenna_in_body = transform_point(*history_.motion_between(history_.latest(), stamp), antenna_);
+  measurement.antenna_in_body =
+      transform_point(*history_.motion_between(history_.latest(), undelayed(stamp)), antenna_);
   measurement.bias_radius_m = biases_.radius_m();
   measurement.time_s = to_seconds(stamp);
   measurement.stamp = stamp;
@@ -350,8 +358,14 @@ void LocalizationPipeline::start_from(const Start& start) {
   event(Level::kInfo, text.str());
 }
 
+StartFix LocalizationPipeline::with_odometry(const LocalFix& fix) const {
+  StartFix start{fix, history_, antenna_};
+  start.fix.stamp = undelayed(fix.stamp);
+  return start;
+}
+
 std::optional<Eigen::Vector2d> LocalizationPipeline::predicted_antenna(Stamp stamp) const {
-  const auto motion = history_.motion_between(history_.latest(), stamp);
+  const auto motion = history_.motion_between(history_.latest(), undelayed(stamp));
   if (!motion) return std::nullopt;
   return transform_point(compose(localizer_->pose(), *motion), antenna_);
 }
@@ -380,6 +394,7 @@ LocalizationReport LocalizationPipeline::report() const {
   status.complaint = complaint();
   status.time_to_detect_s = integrity_.time_to_detect_s();
   status.time_to_recover_s = integrity_.time_to_recover_s();
+  status.fix_delay_s = delay_.delay_s();
   status.contradiction_m2 = integrity_.covariance();
   return reporter_.report(status, *localizer_);
 }

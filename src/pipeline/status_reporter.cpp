@@ -60,6 +60,7 @@ LocalizationReport StatusReporter::report(const PipelineStatus& status, const Lo
   LocalizationReport report = counts_;
   report.time_to_detect_s = status.time_to_detect_s;
   report.time_to_recover_s = status.time_to_recover_s;
+  report.fix_delay_s = status.fix_delay_s;
   report.bias_radius_m = status.bias_radius_m;
   if (status.last_odometry && last_used_) report.fix_age_s = to_seconds(*status.last_odometry - *last_used_);
   if (status.last_odometry && status.last_fix) {

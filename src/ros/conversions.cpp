@@ -274,6 +274,7 @@ msgs::LocalizationStatus to_message(const LocalizationReport& report, const Loca
   message.protection_level = report.protection_level_m;
   message.time_to_detect = report.time_to_detect_s;
   message.time_to_recover = report.time_to_recover_s;
+  message.fix_delay = report.fix_delay_s;
   message.heading_sigma = report.health.heading_sigma_rad;
   message.heading_converged = report.heading_converged;
   message.bias_radius = report.bias_radius_m;

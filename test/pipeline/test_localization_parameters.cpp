@@ -94,6 +94,7 @@ TEST(LocalizationPipeline, EveryParameterHasAnEffect) {
       {"max_bias_radius", {far_off, "200.0"}},
       {"lost_timeout", {far_off, "5.0"}},
       {"fix_timeout", {given, "3.0"}},
+      {"fix_delay", {given, "0.3"}},
       {"bias_timeout", {given, "0.2"}},
       {"satellites_wait", {given, "0.2"}},
       {"time_jump", {given, "0.5"}},

@@ -3,6 +3,7 @@
 #include "urban_gnss_localization/common/parameters.hpp"
 #include "urban_gnss_localization/gnss/datum_initializer.hpp"
 #include "urban_gnss_localization/pipeline/bias_matcher.hpp"
+#include "urban_gnss_localization/pipeline/fix_delay.hpp"
 #include "urban_gnss_localization/pipeline/input_parameters.hpp"
 #include "urban_gnss_localization/pipeline/integrity_monitor.hpp"
 #include "urban_gnss_localization/pipeline/speed_source.hpp"
@@ -32,6 +33,7 @@ struct LocalizationParameters {
   SpeedParameters speed;
   VelocityParameters velocity;
   SatelliteParameters satellites;
+  FixDelayParameters fix_delay;
   BiasMatcherParameters bias;
   IntegrityParameters integrity;
   StatusParameters status;
@@ -44,6 +46,7 @@ struct LocalizationParameters {
     v.group("speed", speed, "Speed of the odometry, and when the receiver's takes its place.");
     v.group("velocity", velocity, "Velocity of the receiver.");
     v.group("satellites", satellites, "Satellites of a fix.");
+    v.include(fix_delay);
     v.group("gps_bias", bias, "Bias of a fix, where the localizer takes it from a bias filter.");
     v.group("integrity", integrity, "Long-run test of the estimate against the fixes.");
     v.group("status", status, "Criteria of the localizer's status.");

@@ -125,7 +125,9 @@ class LocalizationPipeline {
   void correct_with(const ValidatedFix& fix);
 
   void start_from(const Start& start);
-  StartFix with_odometry(const LocalFix& fix) const { return {fix, history_, antenna_}; }
+  StartFix with_odometry(const LocalFix& fix) const;
+  /// When the robot was as a fix or a velocity of this stamp says.
+  Stamp undelayed(Stamp stamp) const { return stamp - from_seconds(delay_.delay_s()); }
   /// Where the antenna was at `stamp` (m, map frame), by the estimate now; nothing outside the odometry's history.
   std::optional<Eigen::Vector2d> predicted_antenna(Stamp stamp) const;
   void guard_against_non_finite();
@@ -146,6 +148,7 @@ class LocalizationPipeline {
   SpeedSource speed_;
   VelocityQueue velocities_;
   FixQueue fixes_;
+  FixDelayEstimator delay_;
   EpochMatcher satellites_;
   BiasMatcher biases_;
   StartSupervisor start_;

@@ -51,6 +51,7 @@ struct LocalizationReport {
   double protection_level_m{std::numeric_limits<double>::quiet_NaN()};
   double time_to_detect_s{std::numeric_limits<double>::quiet_NaN()};   ///< IntegrityMonitor
   double time_to_recover_s{std::numeric_limits<double>::quiet_NaN()};  ///< IntegrityMonitor
+  double fix_delay_s{0.0};                                             ///< FixDelayEstimator
   bool heading_converged{false};
   double bias_radius_m{0.0};
   LocalizerHealth health;
@@ -70,6 +71,7 @@ struct PipelineStatus {
       Eigen::Matrix2d::Zero()};  ///< that the published covariance has beside the localizer's
   double time_to_detect_s{std::numeric_limits<double>::quiet_NaN()};
   double time_to_recover_s{std::numeric_limits<double>::quiet_NaN()};
+  double fix_delay_s{0.0};
 };
 
 /// Counts what was decided, and says how a pipeline and its localizer are.
