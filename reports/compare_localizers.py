@@ -248,8 +248,10 @@ def table(results, methods):
 
 
 def honesty(results):
-    """Header and rows of how the covariance of the recommended localizer fits its errors."""
-    header = ["recording", "median / 95 % / max", "inside 95 %", "NEES / 2", "beyond protection"]
+    """Header and rows of how the covariance of the recommended localizer fits its errors; beside it, the share inside
+    the ellipses of the others."""
+    others = [method for method in next(iter(results.values()), {}) if method not in (ABLATED, RAW_FIX)]
+    header = ["recording", "median / 95 % / max", "inside 95 %", "NEES / 2", "beyond protection"] + others
     rows = []
     for name, scores in results.items():
         if ABLATED not in scores:
@@ -259,8 +261,14 @@ def honesty(results):
         if None in values:
             continue
         rows.append([name, scores[ABLATED].cell(), "{:.3f}".format(values[0]), "{:.2f}".format(values[1] / 2.0),
-                     "{:.2f} %".format(100.0 * values[2])])
+                     "{:.2f} %".format(100.0 * values[2])] + [inside(scores.get(other)) for other in others])
     return header, rows
+
+
+def inside(score):
+    """The share of the truth inside the 95 % ellipse, for people."""
+    share = score.summary.get("inside_95") if score else None
+    return "–" if share is None else "{:.2f}".format(share)
 
 
 def markdown(header, rows):

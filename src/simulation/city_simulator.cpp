@@ -85,11 +85,12 @@ void CitySimulator::step(const std::optional<Twist2>& command, std::vector<Simul
   antenna_history_.push_back(antenna_state());
   if (antenna_history_.size() > 1 + steps_of(scenario_.receiver.fix_delay, interval_s_)) antenna_history_.pop_front();
 
+  // Before the odometry, whose step it is a part of.
+  if (const auto imu = imu_.advance(vehicle_.twist().yaw_rate_radps, vehicle_.acceleration(), interval_s_)) add(*imu);
   if (const auto odometry = odometry_.advance(vehicle_.twist(), interval_s_)) {
     add(TruthEvent{vehicle_.pose(), vehicle_.twist()});
     add(OdometryEvent{odometry->pose, odometry->twist, odometry->speed_variance, odometry->yaw_rate_variance});
   }
-  if (const auto imu = imu_.advance(vehicle_.twist().yaw_rate_radps, vehicle_.acceleration(), interval_s_)) add(*imu);
   if (epoch_clock_.is_due(elapsed_s())) {
     epoch_clock_.advance();
     receive(epoch_clock_.period_s());

@@ -324,12 +324,19 @@ void convert(const fs::path& folder, const std::string& gnss_file, const Odometr
     if (table.size() > 0) start = std::min(start, table.stamp(0));
   }
 
-  // The order of these calls is the order of messages with the same stamp: whatever a fix is compared with comes first.
+  // The order of these calls is the order of messages with the same stamp: whatever a fix is compared with comes first,
+  // and before odometry the yaw rate of its step.
   BagContents contents;
   contents.add(topics::kDatum, start, urban_gnss::to_message(origin, urban_gnss::to_ros_or_throw(start), "map"));
+  const auto add_optional = [&](bool is_imu) {
+    for (const auto& [table, add] : optional_tables) {
+      if ((add == add_imu) == is_imu) add(table, contents);
+    }
+  };
+  add_optional(true);
   add_odometry(odometry, noise, contents);
   add_fixes(fixes, LocalFrame(origin), contents);
-  for (const auto& [table, add] : optional_tables) add(table, contents);
+  add_optional(false);
   contents.write(output);
   contents.print_summary(std::cout);
   std::cout << output.string() << ": " << fs::file_size(output) << " bytes\n";

@@ -255,9 +255,9 @@ TEST(ImmEkf, FirstFixesAfterAGapMoveItLess) {
     for (int k = 0; k < 3; ++k) imm.correct(fix_of(before + Eigen::Vector2d(0.0, 1.0), 0.5, 160.0 + 10.0 * k));
     return (imm.pose().position() - before).norm();
   };
-  const double with_doubt = moved_m("{reacquisition_sigma: 40.0}");
-  EXPECT_LT(with_doubt, 0.5 * moved_m("{reacquisition_sigma: 0.0}"));
-  EXPECT_LT(with_doubt, moved_m("{reacquisition_sigma: 10.0}"));
+  const double with_doubt = moved_m("{reacquisition_sigma: 40.0, reacquisition_time: 60.0}");
+  EXPECT_LT(with_doubt, 0.5 * moved_m("{reacquisition_sigma: 0.0, reacquisition_time: 60.0}"));
+  EXPECT_LT(with_doubt, moved_m("{reacquisition_sigma: 10.0, reacquisition_time: 60.0}"));
   EXPECT_GT(moved_m("{reacquisition_sigma: 40.0, reacquisition_gap: 60.0}"), 2.0 * with_doubt) << "no gap";
   EXPECT_GT(moved_m("{reacquisition_sigma: 40.0, reacquisition_time: 3.0}"), 1.2 * with_doubt) << "soon forgotten";
 }

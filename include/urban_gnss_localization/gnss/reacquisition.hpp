@@ -8,12 +8,12 @@
 
 namespace urban_gnss {
 
-/// What is believed of the first fixes after a gap: a receiver that comes out of a door, a tunnel or a canyon is often
-/// off by tens of metres for a minute, and does not say so.
+/// What is believed of the first fixes after a gap: those of a receiver that comes out of a door or a canyon are often
+/// off by tens of metres, and do not say so.
 struct ReacquisitionParameters {
   double reacquisition_gap{30.0};
   double reacquisition_sigma{20.0};
-  double reacquisition_time{60.0};
+  double reacquisition_time{2.0};
 
   void visit(ParameterVisitor& v) {
     v("reacquisition_gap", reacquisition_gap, positive(), "s",
