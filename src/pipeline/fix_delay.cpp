@@ -12,6 +12,7 @@ namespace {
 constexpr double kMostGiven_s = 5.0;
 constexpr double kWindow_s = 60.0;
 constexpr int kLeastVectors = 15;
+constexpr int kLeastWindows = 2;
 /// A window of which more than this share is left by the best fit says nothing.
 constexpr double kMostLeft = 0.5;
 /// Log-likelihood by which a delay must be better than none, and by which those of its range are worse at the most.
@@ -84,12 +85,13 @@ void DelaySearch::close_window() {
   }
   const double least = *std::min_element(left.begin(), left.end());
   if (!(least > 0.0) || least > kMostLeft * window.measured_square) return;
+  ++window_count_;
   for (std::size_t i = 0; i < kCandidates; ++i) log_likelihood_[i] -= 0.5 * window.count * std::log(left[i] / least);
 }
 
 std::optional<DelayEstimate> DelaySearch::estimate() const {
   const auto best = std::max_element(log_likelihood_.begin(), log_likelihood_.end());
-  if (*best - log_likelihood_.front() < kEvidence) return std::nullopt;
+  if (window_count_ < kLeastWindows || *best - log_likelihood_.front() < kEvidence) return std::nullopt;
   const auto is_likely = [&](double each) { return each >= *best - kRange; };
   const auto first = std::find_if(log_likelihood_.begin(), log_likelihood_.end(), is_likely);
   const auto last = std::find_if(log_likelihood_.rbegin(), log_likelihood_.rend(), is_likely);

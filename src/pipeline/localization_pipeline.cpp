@@ -222,6 +222,8 @@ bool LocalizationPipeline::process_next_fix() {
   if (!is_too_old && initialized() && awaits_more(next->fix.stamp)) return false;
 
   const ValidatedFix fix = fixes_.pop();
+  // The receiver's own speed, in place of the odometry's, does not tell how late the receiver is.
+  if (speed_.is_wrong()) delay_.forget_odometry();
   delay_.add(fix.fix.stamp, fix.fix.position, history_, antenna_);
   if (const auto news = delay_.take_news()) event(Level::kInfo, *news);
   if (is_too_old) {

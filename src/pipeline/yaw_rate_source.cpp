@@ -38,18 +38,18 @@ Twist2 YawRateSource::twist_of(const OdometrySample& step, Stamp since, std::vec
   watch(imu_radps, duration_s, events);
   if (!imu_radps) return twist;
   compare(twist.yaw_rate_radps, *imu_radps, duration_s, events);
-  twist.yaw_rate_radps = judge(twist.yaw_rate_radps, *imu_radps, duration_s);
+  twist.yaw_rate_radps = judge(twist, *imu_radps, duration_s);
   return twist;
 }
 
-double YawRateSource::judge(double odometry_radps, double imu_radps, double duration_s) {
-  const YawRateFault fault = arbiter_.add(odometry_radps, imu_radps, duration_s);
+double YawRateSource::judge(const Twist2& odometry, double imu_radps, double duration_s) {
+  const YawRateFault fault = arbiter_.add(odometry, imu_radps, duration_s);
   if (fault == YawRateFault::kNone) {
     doubt_.end();
   } else {
-    doubt_rad2_ = doubt_.grow((imu_radps - odometry_radps) * duration_s);
+    doubt_rad2_ = doubt_.grow((imu_radps - odometry.yaw_rate_radps) * duration_s);
   }
-  return fault == YawRateFault::kImu ? odometry_radps : imu_radps;
+  return fault == YawRateFault::kImu ? odometry.yaw_rate_radps : imu_radps;
 }
 
 bool YawRateSource::contradicts_wheels() const {
@@ -59,8 +59,8 @@ bool YawRateSource::contradicts_wheels() const {
 std::string YawRateSource::complaint() const {
   if (arbiter_.fault() == YawRateFault::kNone || arbiter_.lasted_s() < kLasting_s) return {};
   return arbiter_.fault() == YawRateFault::kImu
-             ? "the IMU's yaw rate changed at once, the odometry's did not: the odometry's is used"
-             : "the odometry turns, and the IMU does not: one wheel dead, or slipping?";
+             ? "the IMU's yaw rate jumped, the odometry's did not: the odometry's is used"
+             : "odometry and IMU turn differently: one wheel dead, or slipping?";
 }
 
 std::optional<double> YawRateSource::mean_between(Stamp since, Stamp until) const {

@@ -197,7 +197,7 @@ TEST(UkfInput, EveryParameterHasAnEffect) {
     base.reacquisition.reacquisition_gap = 4.0;
     if (name == "common_error_max") base.common_error.common_error_min = 0.1;
     const std::string value = name == "outliers"           ? "none"
-                              : name == "gate_probability" ? "0.2"
+                              : name == "gate_probability" ? "0.05"
                               : name == "gate_timeout"     ? "2.0"
                               : name == "ukf_alpha"        ? "0.9"
                               : name == "ukf_beta"         ? "0.0"

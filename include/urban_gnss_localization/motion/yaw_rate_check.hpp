@@ -2,6 +2,8 @@
 
 #include <optional>
 
+#include "urban_gnss_localization/motion/motion_model.hpp"
+
 namespace urban_gnss {
 
 /// Compares the yaw rate of an IMU with that of the odometry, to find an IMU that is mounted upside down or reports
@@ -25,28 +27,31 @@ class YawRateCheck {
 /// Which of two yaw rates contradicts the other.
 enum class YawRateFault {
   kNone,
-  kImu,       ///< it changed at once, and the wheels did not: a gyroscope's glitch or step
-  kOdometry,  ///< the wheels changed at once, or were wrong from the start: one dead, or slipping
+  kImu,       ///< it jumped, and the wheels did not: a gyroscope's glitch or step
+  kOdometry,  ///< the wheels turn, or do not, where the robot does the opposite: one dead, or slipping
 };
 
-/// Tells which yaw rate is wrong where IMU and odometry contradict each other grossly: the one that has changed more
-/// since they agreed. Wheels that skid turn up to twice as fast as the robot; that is no contradiction.
+/// Tells which yaw rate is wrong where IMU and odometry contradict each other grossly: the IMU's where it jumped within
+/// one step while the wheels rolled on, else the odometry's. Some odometry tells no yaw rate at all: it has a say
+/// against the IMU once it has told one, and is wrong only once it has agreed with the IMU in a turn. Wheels that skid
+/// turn up to twice as fast as the robot; that is no contradiction.
 class YawRateArbiter {
  public:
   /// One step with both rates.
-  YawRateFault add(double odometry_radps, double imu_radps, double duration_s);
+  YawRateFault add(const Twist2& odometry, double imu_radps, double duration_s);
 
   YawRateFault fault() const { return fault_; }
   /// s since the contradiction began; 0 where there is none.
   double lasted_s() const { return lasted_s_; }
 
  private:
-  /// Both rates (rad/s) a moment ago, while they agreed.
-  struct Agreement {
-    double odometry_radps{0.0};
-    double imu_radps{0.0};
-  };
-  std::optional<Agreement> agreement_;
+  bool contradict(double odometry_radps, double imu_radps) const;
+  /// Which of them is wrong, at the first step of a contradiction.
+  YawRateFault judge(const Twist2& odometry, double imu_radps) const;
+
+  double told_s_{0.0};    ///< in which the odometry told a yaw rate other than 0
+  double agreed_s_{0.0};  ///< of turning
+  std::optional<double> last_imu_radps_;
   YawRateFault fault_{YawRateFault::kNone};
   double lasted_s_{0.0};
 };

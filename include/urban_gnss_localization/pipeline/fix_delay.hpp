@@ -61,6 +61,7 @@ class DelaySearch {
   void close_window();
 
   Window window_;
+  int window_count_{0};  ///< that said something
   std::array<double, kCandidates> log_likelihood_{};
 };
 

@@ -50,6 +50,8 @@ class SpeedSource {
   /// Another sensor contradicts the wheels, or does not any more.
   void set_wheels_contradicted(bool contradicted) { is_contradicted_ = contradicted && parameters_.check_wheels; }
 
+  /// Whether the odometry's speed is not believed.
+  bool is_wrong() const { return check_.fault() != SpeedFault::kNone || is_contradicted_; }
   /// Why the odometry's speed is not believed; empty where it is.
   std::string complaint() const;
   /// The estimate started anew: its heading has shown no sign yet.
@@ -74,7 +76,6 @@ class SpeedSource {
   void note(double odometry_mps, Stamp stamp);
   /// Whether the receiver's speed is recent enough to be used.
   bool is_fresh(Stamp stamp) const;
-  bool is_wrong() const { return check_.fault() != SpeedFault::kNone || is_contradicted_; }
   /// Leaves out a speed that no acceleration explains, for up to 2 s.
   double without_glitch(double odometry_mps, double duration_s, std::vector<PipelineEvent>& events);
 

@@ -33,7 +33,7 @@ bool is_usable_yaw_rate(double yaw_rate_radps);
 /// a radian in 10 s. This is little beside the uncertainty that grows in that time, but too much over minutes. So a
 /// change of the source is an event, and so is an IMU that contradicts the odometry.
 ///
-/// Where both contradict each other grossly, the one that did not change is used (YawRateArbiter), with a doubt.
+/// Where both contradict each other grossly, the one that is not wrong by YawRateArbiter is used, with a doubt.
 class YawRateSource {
  public:
   /// `silence_s`: without a yaw rate for longer than this, the IMU is silent. Requires parameters without faults.
@@ -65,7 +65,7 @@ class YawRateSource {
   void watch(std::optional<double> imu_radps, double duration_s, std::vector<PipelineEvent>& events);
   void compare(double odometry_radps, double imu_radps, double duration_s, std::vector<PipelineEvent>& events);
   /// The rate that is believed.
-  double judge(double odometry_radps, double imu_radps, double duration_s);
+  double judge(const Twist2& odometry, double imu_radps, double duration_s);
 
   YawRateParameters parameters_;
   double silence_s_;
