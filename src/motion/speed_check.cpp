@@ -98,7 +98,10 @@ double SpeedCheck::suspected_for_s() const {
 
 SpeedFault SpeedCheck::add(const SpeedPair& pair) {
   // Where both stand, any wheels agree.
-  if (std::max(std::abs(pair.odometry_mps), std::abs(pair.receiver_mps)) < kTolerance_mps) return fault_;
+  if (std::max(std::abs(pair.odometry_mps), std::abs(pair.receiver_mps)) < kTolerance_mps) {
+    if (run_ != fault_) run_.reset();  // what was suspected is not any more
+    return fault_;
+  }
   const bool is_slow = std::abs(pair.odometry_mps) < kSlow_mps;
   if (is_slow || (last_ && pair.odometry_mps * last_->odometry_mps < 0.0)) turned_ = pair.stamp;
   const auto pattern = pattern_of(pair);

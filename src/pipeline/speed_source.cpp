@@ -130,6 +130,7 @@ double SpeedSource::without_glitch(double odometry_mps, double duration_s, std::
 
 std::string SpeedSource::complaint() const {
   if (check_.fault() != SpeedFault::kNone) return describe(check_.fault(), shown_);
+  if (odometry_.empty() || !is_fresh(odometry_.back().stamp)) return {};
   const double least_s = check_.began_with_a_jump() ? kSuspectedJump_s : kSuspected_s;
   return check_.suspected_for_s() >= least_s ? describe(SpeedFault::kNone, pair_) : std::string();
 }

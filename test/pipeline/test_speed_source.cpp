@@ -100,6 +100,20 @@ TEST(SpeedSource, ContradictionIsToldBeforeItIsFound) {
   EXPECT_EQ(drive.source.complaint(), "") << "it was the receiver";
 }
 
+TEST(SpeedSource, ContradictionEndsWhereTheRobotStandsOrTheReceiverIsSilent) {
+  Drive standing;
+  standing.step_for(10.0, 5.0, 5.0);
+  standing.step_for(3.0, 5.0, 3.3);
+  EXPECT_NE(standing.source.complaint(), "");
+  standing.step(0.0, 0.1);
+  EXPECT_EQ(standing.source.complaint(), "");
+  Drive silent;
+  silent.step_for(10.0, 5.0, 5.0);
+  silent.step_for(3.0, 5.0, 3.3);
+  for (int k = 0; k < 26; ++k) silent.step(5.0);
+  EXPECT_EQ(silent.source.complaint(), "");
+}
+
 TEST(SpeedSource, JumpOfTheOdometryIsDoubtedAtOnce) {
   Drive drive;
   drive.step_for(10.0, 3.0, 3.0);
