@@ -26,6 +26,7 @@ constexpr double kNewsworthy_s = 0.1;
 constexpr double kLeastApart_s = 1.9;
 constexpr double kMostApart_s = 4.0;
 constexpr double kLeastWay_m = 1.0;
+
 std::complex<double> to_complex(const Eigen::Vector2d& vector) { return {vector.x(), vector.y()}; }
 
 /// The antenna's places by the odometry (m) at the stamp by each delay; nothing where the history does not reach as

@@ -60,7 +60,7 @@ void LocalizationPipeline::reset(const std::string& why) {
   speed_.reset();
   velocities_.reset();
   fixes_.reset();
-  delay_ = FixDelayEstimator(parameters_.fix_delay);
+  delay_.reset();
   satellites_.reset();
   biases_.reset();
   start_.reset();

@@ -44,6 +44,7 @@ class Reacquisition {
     if (is_first(time_s)) regained_s_ = time_s;
     last_s_ = time_s;
   }
+  void reset() { *this = Reacquisition(parameters_); }
 
  private:
   bool is_first(double time_s) const { return last_s_ && time_s - *last_s_ > parameters_.reacquisition_gap; }

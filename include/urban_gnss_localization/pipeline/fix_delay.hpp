@@ -77,6 +77,7 @@ class FixDelayEstimator {
            const Eigen::Vector2d& antenna);
   /// The odometry's history begins anew.
   void forget_odometry();
+  void reset() { *this = FixDelayEstimator(parameters_); }
 
   /// s >= 0: as it is given, or found; 0 until it is found.
   double delay_s() const { return delay_s_; }

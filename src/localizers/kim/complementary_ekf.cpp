@@ -44,7 +44,7 @@ void ComplementaryEkf::initialize(const PoseEstimate& start) {
   path_variance_m2_ = 0.0;
   is_open_ = false;
   had_fix_ = false;
-  reacquisition_ = Reacquisition(parameters_.reacquisition);
+  reacquisition_.reset();
   common_variance_m2_ = 0.0;
   insignificant_ = 0;
   is_inert_ = false;

@@ -73,7 +73,7 @@ void Ukf::initialize(const PoseEstimate& start) {
   limit_yaw_variance(covariance_);
   noise_.reset();
   track_ = {};
-  reacquisition_ = Reacquisition(parameters_.reacquisition);
+  reacquisition_.reset();
   common_variance_m2_ = 0.0;
   rejected_since_s_.reset();
 }
@@ -83,10 +83,8 @@ void Ukf::move(const Twist2& twist, double duration_s) {
   noise_.move(twist, duration_s);
   track_.move(twist, duration_s);
   if (is_standstill(twist, parameters_.odometry.standstill_radps)) {
-    Covariance covariance = covariance_;
     const double walk = parameters_.odometry.parked_walk;
-    covariance.diagonal().head<2>().array() += walk * walk * duration_s;
-    accept(state_, covariance);
+    doubt({walk * walk * duration_s, 0.0});
     return;
   }
   const MotionStep step = make_motion_step(twist, duration_s, motion_, parameters_.odometry);

@@ -31,7 +31,7 @@ FixStatistics::FixStatistics(const SwitchingModelParameters& parameters)
 void FixStatistics::reset() {
   noise_.reset();
   range_noise_.reset();
-  reacquisition_ = Reacquisition(parameters_.reacquisition);
+  reacquisition_.reset();
   nominal_cn0_.reset();
   of_ranges_ = false;
   velocity_scale_ = parameters_.velocity.fresh_scale();

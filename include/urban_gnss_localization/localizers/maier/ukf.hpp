@@ -70,9 +70,8 @@ UkfParameters published_ukf();
 /// Motion: the noise of Nishida et al. (5)-(7) enters as three more dimensions of the transform (move_noisily()).
 /// Fix: h is the antenna's position, lever arm included. The innovation's NIS is of the fix's covariance by
 /// FixNoiseModel and Reacquisition; for the update, that is multiplied by correlation_inflation(), since errors that
-/// last carry less information than independent ones, and divided by the weight of the Student-t distribution, min(1,
-/// (dof + 2) / (dof
-/// + NIS)). The published covariance holds the error that all fixes share, too.
+/// last carry less information than independent ones, and divided by the weight of the Student-t distribution,
+/// min(1, (dof + 2) / (dof + NIS)). The published covariance holds the error that all fixes share, too.
 ///
 /// Yaws are averaged as differences from the central point that are never wrapped, which is the mean on the circle and
 /// has no ambiguity. Its standard deviation is kept at or below that of an unknown yaw, pi / sqrt(3).
