@@ -2,19 +2,11 @@
 
 #include <deque>
 #include <optional>
-#include <vector>
 
 #include "urban_gnss_localization/common/stamp.hpp"
-#include "urban_gnss_localization/gnss/satellite.hpp"
+#include "urban_gnss_localization/gnss/satellite_epoch.hpp"
 
 namespace urban_gnss {
-
-/// The satellites of one epoch of a receiver.
-struct SatelliteEpoch {
-  Stamp stamp{0};
-  std::vector<SatelliteObservation> satellites;
-  double angle_resolution_rad{0.0};  ///< step to which the receiver rounds azimuth and elevation; 0: unknown
-};
 
 /// Pairs fixes with satellites by their stamps; satellites may come before or after their fix.
 class EpochMatcher {
