@@ -6,6 +6,7 @@
 #include <map>
 
 #include "urban_gnss_localization/common/positive_definite.hpp"
+#include "urban_gnss_localization/gnss/range_geometry.hpp"
 
 namespace urban_gnss {
 namespace {
@@ -16,12 +17,9 @@ constexpr double kLeastSigma_m = 1e-3;
 constexpr double kMaxResidual_m = 1e5;  ///< beyond it, a driver's invention
 constexpr int kRounds = 4;
 constexpr int kPlane = 2;
-constexpr int kHeight = 2;
-constexpr int kFirstClock = 3;
 
 struct SatelliteRange {
-  Constellation clock;
-  Eigen::Vector3d line_of_sight;
+  RangeDirection direction;
   double residual_m;
   double nlos_before;  ///< probability of NLOS by C/N0
   NlosRange nlos;      ///< excess, if it is
@@ -44,8 +42,10 @@ std::vector<SatelliteRange> ranges_of(const std::vector<SatelliteObservation>& s
     if (sharing[clock] < 2) continue;  // alone, it only tells its clock
     const double weaker_db = nominal_cn0_dbhz - levelled_cn0_dbhz(each, p.nlos);
     const double nlos = probability_of(nlos_log_odds(weaker_db - p.nlos_cn0_drop, p.nlos));
-    ranges.push_back({clock, line_of_sight(each.look), each.residual_m,
-                      std::clamp(nlos, 1.0 - kMostCertain, kMostCertain), nlos_range(each.look.elevation_rad, p.nlos)});
+    ranges.push_back({{clock, line_of_sight(each.look)},
+                      each.residual_m,
+                      std::clamp(nlos, 1.0 - kMostCertain, kMostCertain),
+                      nlos_range(each.look.elevation_rad, p.nlos)});
   }
   return ranges;
 }
@@ -62,18 +62,12 @@ class RangeSystem {
       : ranges_(ranges),
         direct_variance_m2_(parameters.range_sigma * parameters.range_sigma),
         height_information_(1.0 / (parameters.range_height_sigma * parameters.range_height_sigma)) {
-    std::map<Constellation, int> clocks;
-    for (const SatelliteRange& range : ranges)
-      clocks.emplace(range.clock, kFirstClock + static_cast<int>(clocks.size()));
-    const auto count = static_cast<Eigen::Index>(ranges.size());
-    unknowns_ = kFirstClock + static_cast<Eigen::Index>(clocks.size());
-    h_ = Eigen::MatrixXd::Zero(count, unknowns_);
-    nlos_probability_.resize(count);
-    for (Eigen::Index i = 0; i < count; ++i) {
-      const SatelliteRange& range = ranges[static_cast<std::size_t>(i)];
-      h_.row(i).head<3>() = -range.line_of_sight;
-      h_(i, clocks.at(range.clock)) = 1.0;
-      nlos_probability_[i] = range.nlos_before;
+    std::vector<RangeDirection> directions;
+    for (const SatelliteRange& range : ranges) directions.push_back(range.direction);
+    h_ = range_geometry(directions);
+    nlos_probability_.resize(h_.rows());
+    for (Eigen::Index i = 0; i < h_.rows(); ++i) {
+      nlos_probability_[i] = ranges[static_cast<std::size_t>(i)].nlos_before;
     }
   }
 
@@ -106,7 +100,7 @@ class RangeSystem {
     right.head<kPlane>() += information * known.offset;
     const Eigen::LDLT<Eigen::MatrixXd> factors(normal);
     const Eigen::VectorXd solution = factors.solve(right);
-    const Eigen::MatrixXd covariance = factors.solve(Eigen::MatrixXd::Identity(unknowns_, unknowns_));
+    const Eigen::MatrixXd covariance = factors.solve(Eigen::MatrixXd::Identity(h_.cols(), h_.cols()));
     for (Eigen::Index i = 0; i < h_.rows(); ++i) {
       const SatelliteRange& range = ranges_[static_cast<std::size_t>(i)];
       const double error = range.residual_m - h_.row(i).dot(solution);
@@ -119,7 +113,7 @@ class RangeSystem {
 
   /// The place by the normal equations: height and clocks are whatever fits best.
   RelativePlace place() const {
-    const Eigen::Index others = unknowns_ - kPlane;
+    const Eigen::Index others = h_.cols() - kPlane;
     const Eigen::MatrixXd gain =
         normal_.bottomRightCorner(others, others).ldlt().solve(normal_.bottomLeftCorner(others, kPlane)).transpose();
     Eigen::Matrix2d information =
@@ -149,14 +143,13 @@ class RangeSystem {
     }
     const Eigen::MatrixXd weighted = weight.asDiagonal() * h_;
     normal_ = h_.transpose() * weighted;
-    normal_(kHeight, kHeight) += height_information_;
+    normal_(kHeightColumn, kHeightColumn) += height_information_;
     right_ = weighted.transpose() * target;
   }
 
   const std::vector<SatelliteRange>& ranges_;
   double direct_variance_m2_;
   double height_information_;
-  Eigen::Index unknowns_;
   Eigen::MatrixXd h_;
   Eigen::VectorXd nlos_probability_;  ///< probabilities
   Eigen::MatrixXd normal_;

@@ -44,6 +44,7 @@ LocalizationPipeline::LocalizationPipeline(const LocalizationParameters& paramet
       velocities_(parameters.velocity),
       fixes_(parameters.input.fix_validation),
       delay_(parameters.fix_delay),
+      residuals_(parameters.satellites.residuals),
       biases_(parameters.bias),
       start_(parameters.start),
       integrity_(parameters.integrity),
@@ -62,6 +63,7 @@ void LocalizationPipeline::reset(const std::string& why) {
   fixes_.reset();
   delay_.reset();
   satellites_.reset();
+  residuals_ = ResidualCheck(parameters_.satellites.residuals);
   biases_.reset();
   start_.reset();
   integrity_.reset();
@@ -174,8 +176,24 @@ void LocalizationPipeline::compare_speed(const MatchedVelocity& velocity) {
 }
 
 void LocalizationPipeline::add_satellites(Stamp stamp, std::vector<SatelliteObservation> satellites) {
+  check_residuals(satellites);
   satellites_.add({stamp, std::move(satellites)});
   process_fixes();
+}
+
+void LocalizationPipeline::check_residuals(std::vector<SatelliteObservation>& satellites) {
+  const bool belonged = residuals_.belong();
+  residuals_.add(satellites);
+  const bool belong = residuals_.belong();
+  if (belonged && !belong) {
+    event(Level::kWarn,
+          "the range residuals on gps/satellites are not those of the fixes (of another solution, or of a "
+          "filter in the receiver): the ranges are not used");
+  } else if (!belonged && belong) {
+    event(Level::kInfo, "the range residuals on gps/satellites are those of the fixes: the ranges are used");
+  }
+  if (belong) return;
+  for (SatelliteObservation& each : satellites) each.residual_m = SatelliteObservation::kUnknown;
 }
 
 void LocalizationPipeline::add_bias(const BiasEstimate& bias) {

@@ -1,3 +1,5 @@
+#include <cmath>
+
 #include "pipeline_rig.hpp"
 #include "range_rig.hpp"
 #include "urban_gnss_localization/localizers/switching/imm_ekf.hpp"
@@ -229,10 +231,11 @@ std::vector<LocalizationOutput> outputs_of(bool satellites_first, bool knows_bef
   for (int k = 0; k <= 300; ++k) {
     const double time = 0.1 * k;
     if (k % 10 == 5) {
-      const Eigen::Vector2d error(6.0 + draw_normal(engine), 3.0 * draw_normal(engine));
-      Sky sky = with_ranges(open_sky(), {-error.x(), -error.y(), 0.0});
-      sky[2].residual_m += 40.0;
-      set_cn0(sky[2], 14.0);
+      Sky ranges = with_ranges(open_sky(), Eigen::Vector3d::Zero());
+      for (SatelliteObservation& each : ranges) each.residual_m += draw_normal(engine);
+      ranges[2].residual_m += 40.0;
+      set_cn0(ranges[2], 14.0);
+      const auto [sky, error] = at_solution(ranges, [](const SatelliteObservation&) { return 1.0; });
       const bool first = satellites_first || (knows_beforehand && k == 5);
       if (first) rig.pipeline.add_satellites(Rig::at(time), sky);
       rig.fix(time, error);
@@ -254,6 +257,36 @@ TEST(SatellitesOfFixes, BeforeOrAfterTheFixIsTheSameRun) {
     EXPECT_EQ(before[i].estimate.covariance, after[i].estimate.covariance) << i;
   }
   EXPECT_LT((before.back().estimate.pose.position() - Rig::truth(30.0).position()).norm(), 1.5);
+}
+
+TEST(SatellitesOfFixes, ResidualsOfAnotherPositionAreLeftOut) {
+  const Sky at_the_fix = at_solution([] {
+    Sky sky = with_ranges(two_constellations(), Eigen::Vector3d::Zero());
+    sky[2].residual_m += 40.0;
+    return sky;
+  }());
+  Sky beside = at_the_fix;
+  for (SatelliteObservation& each : beside) each.residual_m += range_gradient(each.look).x() * 20.0;
+
+  const auto residual_with = [&](const Sky& sky, const std::string& changes) {
+    SkyRig rig(changes);
+    std::size_t warnings = 0;
+    for (const double time : {1.0, 2.0, 3.0}) {
+      rig.pipeline.add_satellites(Rig::at(time), sky);
+      rig.fix(time);
+      rig.drive(time);
+      for (const PipelineEvent& event : rig.pipeline.take_events()) {
+        warnings += event.text.find("residuals") != std::string::npos;
+      }
+    }
+    const auto& taken = rig.fake->fixes.back().satellites;
+    EXPECT_EQ(taken.size(), sky.size());
+    EXPECT_EQ(warnings, std::isnan(taken[2].residual_m) ? 1u : 0u);
+    return taken[2].residual_m;
+  };
+  EXPECT_EQ(residual_with(at_the_fix, "{}"), at_the_fix[2].residual_m);
+  EXPECT_TRUE(std::isnan(residual_with(beside, "{}")));
+  EXPECT_EQ(residual_with(beside, "{residual_misfit_limit: 10.0}"), beside[2].residual_m);
 }
 
 }  // namespace

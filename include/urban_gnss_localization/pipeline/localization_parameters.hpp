@@ -2,6 +2,7 @@
 
 #include "urban_gnss_localization/common/parameters.hpp"
 #include "urban_gnss_localization/gnss/datum_initializer.hpp"
+#include "urban_gnss_localization/gnss/residual_check.hpp"
 #include "urban_gnss_localization/pipeline/bias_matcher.hpp"
 #include "urban_gnss_localization/pipeline/fix_delay.hpp"
 #include "urban_gnss_localization/pipeline/input_parameters.hpp"
@@ -14,13 +15,15 @@
 
 namespace urban_gnss {
 
-/// How a fix waits for its satellites.
+/// How a fix waits for its satellites, and when their residuals are its own.
 struct SatelliteParameters {
   double satellites_wait{0.5};
+  ResidualCheckParameters residuals;
 
   void visit(ParameterVisitor& v) {
     v("satellites_wait", satellites_wait, non_negative(), "s",
       "time, by the odometry's stamps, that a fix waits for its gps/satellites if the fix before had some");
+    v.include(residuals);
   }
 };
 

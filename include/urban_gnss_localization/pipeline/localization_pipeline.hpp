@@ -63,7 +63,7 @@ class LocalizationPipeline {
   void add_velocity(const RawVelocity& velocity);
   /// The satellites of the fix at `stamp`, before or after it. Once satellites have come to a fix, the next waits for
   /// its own, by satellites_wait at the most, if the localizer makes use of them. Whatever the localizer, they tell
-  /// whether a fix is spoilt (IntegrityMonitor).
+  /// whether a fix is spoilt (IntegrityMonitor). Residuals that are not those of the fixes (ResidualCheck) are left out.
   void add_satellites(Stamp stamp, std::vector<SatelliteObservation> satellites);
   /// The bias at a fix, where the localizer wants one.
   void add_bias(const BiasEstimate& bias);
@@ -117,6 +117,7 @@ class LocalizationPipeline {
   bool awaits_more(Stamp fix) const;
   void start_with(const ValidatedFix& fix);
   bool restart_with(const ValidatedFix& fix);
+  void check_residuals(std::vector<SatelliteObservation>& satellites);
   /// Which sources contradict each other; empty where none do.
   std::string complaint() const;
   void compare_speed(const MatchedVelocity& velocity);
@@ -150,6 +151,7 @@ class LocalizationPipeline {
   FixQueue fixes_;
   FixDelayEstimator delay_;
   EpochMatcher satellites_;
+  ResidualCheck residuals_;
   BiasMatcher biases_;
   StartSupervisor start_;
   IntegrityMonitor integrity_;

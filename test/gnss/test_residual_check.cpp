@@ -1,0 +1,103 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <limits>
+
+#include "range_rig.hpp"
+#include "urban_gnss_localization/gnss/residual_check.hpp"
+
+namespace urban_gnss {
+namespace {
+
+using Weight = std::function<double(const SatelliteObservation&)>;
+
+double equal_weight(const SatelliteObservation&) { return 1.0; }
+double by_elevation(const SatelliteObservation& s) { return std::pow(std::sin(s.look.elevation_rad), 2); }
+double by_cn0(const SatelliteObservation& s) { return std::pow(10.0, s.cn0_dbhz / 10.0); }
+
+/// A sky with noise of 5 m, and one range of 30 m, on the ranges.
+Sky noisy(RandomEngine& engine) {
+  Sky sky = two_constellations();
+  for (SatelliteObservation& each : sky) {
+    each.cn0_dbhz = uniform_between(25.0, 48.0, engine);
+    each.residual_m = 5.0 * draw_normal(engine);
+  }
+  sky[1].residual_m += 30.0;
+  return sky;
+}
+
+Sky solved(const Sky& sky, const Weight& weight) { return at_solution(sky, weight).first; }
+
+/// As the same ranges say them at a place `east_m` beside.
+Sky seen_from_beside(Sky sky, double east_m) {
+  for (SatelliteObservation& each : sky) each.residual_m += east_m * line_of_sight(each.look).x();
+  return sky;
+}
+
+TEST(ResidualMisfit, IsNothingAtALeastSquaresSolutionWhateverItsWeights) {
+  RandomEngine engine = make_engine(301);
+  for (const Weight& weight : {Weight(equal_weight), Weight(by_elevation), Weight(by_cn0),
+                               Weight([](const auto& s) { return by_elevation(s) * by_cn0(s); })}) {
+    const auto misfit = residual_misfit(solved(noisy(engine), weight));
+    ASSERT_TRUE(misfit);
+    EXPECT_LT(*misfit, 1e-9);
+  }
+}
+
+TEST(ResidualMisfit, IsLargeAtAnotherPlace) {
+  RandomEngine engine = make_engine(302);
+  const Sky sky = solved(noisy(engine), by_elevation);
+  EXPECT_GT(residual_misfit(seen_from_beside(sky, 15.0)).value(), 0.5);
+}
+
+TEST(ResidualMisfit, SaysNothingOfTooFewRanges) {
+  RandomEngine engine = make_engine(303);
+  Sky sky = solved(noisy(engine), equal_weight);
+  sky.resize(5);  // and four unknowns
+  EXPECT_FALSE(residual_misfit(sky));
+  EXPECT_FALSE(residual_misfit({}));
+}
+
+TEST(ResidualMisfit, LeavesOutWhatIsUnknown) {
+  RandomEngine engine = make_engine(304);
+  Sky sky = solved(noisy(engine), equal_weight);
+  for (const double odd : {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+    Sky with_odd = sky;
+    with_odd.push_back(satellite(31, 10.0, 20.0));
+    with_odd.back().residual_m = odd;
+    EXPECT_NEAR(*residual_misfit(with_odd), *residual_misfit(sky), 1e-12);
+  }
+}
+
+TEST(ResidualMisfit, OfNoResidualAtAllIsNothing) {
+  Sky sky = two_constellations();
+  for (SatelliteObservation& each : sky) each.residual_m = 0.0;
+  EXPECT_FALSE(residual_misfit(sky));
+}
+
+TEST(ResidualCheck, GoesByTheMedianOfTheLastEpochs) {
+  RandomEngine engine = make_engine(305);
+  ResidualCheck check{ResidualCheckParameters{}};
+  EXPECT_TRUE(check.belong());
+  for (int k = 0; k < 20; ++k) {
+    check.add(solved(noisy(engine), by_cn0));
+    EXPECT_TRUE(check.belong());
+  }
+  for (int k = 0; k < 7; ++k) check.add(seen_from_beside(solved(noisy(engine), by_cn0), 30.0));
+  EXPECT_TRUE(check.belong());
+  check.add(seen_from_beside(solved(noisy(engine), by_cn0), 30.0));
+  EXPECT_FALSE(check.belong());
+  for (int k = 0; k < 8; ++k) check.add(solved(noisy(engine), by_cn0));
+  EXPECT_TRUE(check.belong());
+}
+
+TEST(ResidualCheck, NoiseIsNoSolution) {
+  RandomEngine engine = make_engine(306);
+  ResidualCheck check{ResidualCheckParameters{}};
+  for (int k = 0; k < 15; ++k) check.add(noisy(engine));
+  EXPECT_FALSE(check.belong());
+}
+
+}  // namespace
+}  // namespace urban_gnss
