@@ -48,9 +48,15 @@ std::string describe(const Contradiction& contradiction) {
 }
 
 void IntegrityMonitor::add(const FixMisfit& misfit) {
+  newest_ = misfit.stamp;
   window_.push_back(misfit);
   while (to_seconds(misfit.stamp - window_.front().stamp) > parameters_.integrity_window) window_.pop_front();
   judge(misfit.stamp);
+}
+
+void IntegrityMonitor::note_correction(const Eigen::Vector2d& moved) {
+  if (!window_.empty()) window_.back().moved = moved;
+  if (contradiction_) given_way_ += moved;
 }
 
 void IntegrityMonitor::judge(Stamp now) {
@@ -71,6 +77,8 @@ void IntegrityMonitor::judge(Stamp now) {
     contradiction_ = Contradiction{first_beyond(parameters_.integrity_limit), now, offset, 0.0};
     time_to_detect_s_ = to_seconds(now - contradiction_->since);
     time_to_recover_s_ = std::numeric_limits<double>::quiet_NaN();
+    given_way_ *= std::sqrt(doubt_left());
+    for (const FixMisfit& each : window_) given_way_ += each.moved;
   }
   contradiction_->offset = offset;
   contradiction_->sigma_m = std::sqrt(0.5 * claimed.trace());
@@ -85,18 +93,26 @@ Stamp IntegrityMonitor::first_beyond(double sigmas) const {
 }
 
 Eigen::Matrix2d IntegrityMonitor::covariance() const {
-  if (!contradiction_) return Eigen::Matrix2d::Zero();
-  return contradiction_->offset * contradiction_->offset.transpose();
+  Eigen::Matrix2d doubt = doubt_left() * given_way_ * given_way_.transpose();
+  if (contradiction_) doubt += contradiction_->offset * contradiction_->offset.transpose();
+  return doubt;
+}
+
+double IntegrityMonitor::doubt_left() const {
+  return contradiction_ ? 1.0 : std::exp(-to_seconds(newest_ - given_way_at_) / parameters_.doubt_time);
 }
 
 void IntegrityMonitor::end(Stamp now) {
   if (contradiction_) time_to_recover_s_ = to_seconds(now - contradiction_->found);
   contradiction_.reset();
   is_persistent_ = false;
+  given_way_at_ = now;
 }
 
-void IntegrityMonitor::restart(bool is_told) {
-  if (contradiction_ && !window_.empty()) end(window_.back().stamp);
+void IntegrityMonitor::restart(bool is_told, const Eigen::Vector2d& moved) {
+  given_way_ = is_told ? Eigen::Vector2d::Zero() : Eigen::Vector2d(std::sqrt(doubt_left()) * given_way_ + moved);
+  given_way_at_ = newest_;
+  if (contradiction_) end(newest_);
   window_.clear();
   is_unconfirmed_ = is_told;
 }

@@ -310,7 +310,9 @@ void LocalizationPipeline::correct_with(const ValidatedFix& fix) {
 
   const bool is_spoilt = epoch != nullptr && residual_rms_m(epoch->satellites) > parameters_.integrity.residual_limit;
   if (!is_spoilt) watch_integrity(fix, measurement.antenna_in_body);
+  const Eigen::Vector2d before = localizer_->pose().position();
   FixOutcome outcome = localizer_->correct(measurement);
+  if (!is_spoilt) integrity_.note_correction(localizer_->pose().position() - before);
   outcome.stamp = stamp;
   outcome.covariance_clamped = fix.outcome.covariance_clamped;
   if (outcome.decision == FixDecision::kAccepted) outcome.decision = fix.outcome.decision;
@@ -366,9 +368,11 @@ void LocalizationPipeline::set_datum(const GeodeticPosition& datum) {
 }
 
 void LocalizationPipeline::start_from(const Start& start) {
+  Eigen::Vector2d moved = Eigen::Vector2d::Zero();
+  if (initialized() && !start.is_told) moved = start.estimate.pose.position() - localizer_->pose().position();
   localizer_->initialize(start.estimate);
   start_.note(start);
-  integrity_.restart(start.is_told);
+  integrity_.restart(start.is_told, moved);
   speed_.forget_heading();
   biases_.forget_radius();
   const Pose2& pose = start.estimate.pose;

@@ -228,5 +228,45 @@ TEST(IntegrityMonitor, FixesThatAgreeConfirmAPoseThatWasSet) {
   EXPECT_FALSE(fixes.monitor.is_unconfirmed());
 }
 
+TEST(IntegrityMonitor, FixesThatComeBackLeaveNoDoubt) {
+  Fixes fixes;
+  fixes.add(40, kNone);
+  fixes.add_until(true, kFar);
+  fixes.add(5, kFar);
+  fixes.add_until(false, kNone);
+  EXPECT_EQ(fixes.monitor.covariance(), Eigen::Matrix2d(Eigen::Matrix2d::Zero()));
+}
+
+TEST(IntegrityMonitor, AnEstimateThatGivesWayIsDoubtedForAWhile) {
+  Fixes fixes;
+  fixes.add(40, kNone);
+  const Eigen::Vector2d first = 2.0 * kFar;
+  Eigen::Vector2d offset = first;
+  bool was_contradicted = false;
+  while (!was_contradicted || fixes.monitor.contradiction()) {  // each fix moves it a metre
+    was_contradicted = fixes.add(offset) || was_contradicted;
+    fixes.monitor.note_correction(offset.normalized());
+    offset -= offset.normalized();
+    ASSERT_LT(fixes.time_s, 200.0);
+  }
+  const double way_m = (first - offset).norm();
+  ASSERT_GT(way_m, 40.0);
+  const double sigma_m = std::sqrt(fixes.monitor.covariance().trace());
+  EXPECT_NEAR(sigma_m, way_m, 1.5);
+  EXPECT_NEAR(fixes.monitor.covariance().determinant(), 0.0, 1e-6);  // along the way alone
+  fixes.add(60, kNone);
+  EXPECT_NEAR(std::sqrt(fixes.monitor.covariance().trace()), sigma_m * std::exp(-0.5), 0.5);
+  EXPECT_FALSE(fixes.monitor.contradiction());
+}
+
+TEST(IntegrityMonitor, ANewStartIsDoubtedByHowFarItIsAndAPoseThatWasSetIsNot) {
+  Fixes fixes;
+  fixes.add(40, kNone);
+  fixes.monitor.restart(false, kFar);
+  EXPECT_NEAR(std::sqrt(fixes.monitor.covariance().trace()), 30.0, 1e-9);
+  fixes.monitor.restart(true);
+  EXPECT_EQ(fixes.monitor.covariance(), Eigen::Matrix2d(Eigen::Matrix2d::Zero()));
+}
+
 }  // namespace
 }  // namespace urban_gnss

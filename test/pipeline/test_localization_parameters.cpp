@@ -118,6 +118,7 @@ TEST(LocalizationPipeline, EveryParameterHasAnEffect) {
   const std::map<std::string, std::string> of_faults = {
       {"max_acceleration", "1.0e+4"}, {"check_wheels", "false"},         {"integrity_window", "16.0"},
       {"integrity_limit", "100.0"},   {"contradiction_patience", "2.0"}, {"residual_limit", "0.5"},
+      {"doubt_time", "5.0"},
   };
   for (const auto& [name, value] : of_faults) {
     EXPECT_NE(trace_of_faults(name + ": " + value), trace_of_faults("{}")) << name;

@@ -16,6 +16,7 @@ struct IntegrityParameters {
   double integrity_window{30.0};
   double integrity_limit{3.0};
   double contradiction_patience{20.0};
+  double doubt_time{60.0};
   double residual_limit{5.0};
 
   void visit(ParameterVisitor& v) {
@@ -29,6 +30,8 @@ struct IntegrityParameters {
     v("contradiction_patience", contradiction_patience, non_negative(), "s",
       "time for which a contradiction must last before the estimate starts anew from fixes that agree with the "
       "odometry");
+    v("doubt_time", doubt_time, positive(), "s",
+      "time constant of the variance that is left of a contradiction which ended because the estimate gave way");
   }
 };
 
@@ -38,6 +41,7 @@ struct FixMisfit {
   Eigen::Vector2d offset{Eigen::Vector2d::Zero()};               ///< m, fix minus the antenna by the estimate
   Eigen::Matrix2d fix_covariance{Eigen::Matrix2d::Zero()};       ///< m^2, as the receiver declares it
   Eigen::Matrix2d estimate_covariance{Eigen::Matrix2d::Zero()};  ///< m^2, as it is published
+  Eigen::Vector2d moved{Eigen::Vector2d::Zero()};                ///< m, by which the fix has moved the estimate since
 };
 
 /// A contradiction between the estimate and the fixes, as it stands.
@@ -53,7 +57,10 @@ std::string describe(const Contradiction& contradiction);
 
 /// A long-run test of the estimate: single fixes may be off by any reflection, but the median of half a minute should
 /// not be, beyond what estimate and fixes claim of themselves. A filter that is wrong takes its fixes for reflections;
-/// this test does not ask the filter's opinion of them. It cannot tell which of the two is wrong.
+/// this test does not ask the filter's opinion of them. It cannot tell which of the two is wrong. So a contradiction
+/// that ends because the fixes come back to the estimate leaves nothing behind; one that ends because the estimate has
+/// gone to the fixes leaves the way that it went, as a variance that decays: before a door the fixes may be the wrong
+/// ones.
 class IntegrityMonitor {
  public:
   /// Requires parameters without faults.
@@ -61,9 +68,12 @@ class IntegrityMonitor {
 
   /// Adds a fix that was compared with the estimate; stamps ascend.
   void add(const FixMisfit& misfit);
+  /// The fix that was added last has moved the estimate (m, beside what the odometry says).
+  void note_correction(const Eigen::Vector2d& moved);
   /// Nothing where estimate and fixes agree. It ends below two thirds of the limit.
   const std::optional<Contradiction>& contradiction() const { return contradiction_; }
-  /// m^2, that covers the contradiction: the square of its offset; 0 where there is none.
+  /// m^2, that covers the contradiction: the square of its offset, and of the way that the estimate has gone to the
+  /// fixes because of it; 0 where there is and was none.
   Eigen::Matrix2d covariance() const;
   /// Whether a contradiction has lasted for contradiction_patience.
   bool is_persistent() const { return is_persistent_; }
@@ -76,8 +86,10 @@ class IntegrityMonitor {
   bool is_unconfirmed() const { return is_unconfirmed_; }
 
   /// The estimate is a new one: what was compared says nothing of it. Times of the last contradiction are kept.
-  /// `is_told`: it is not from fixes, somebody has set it.
-  void restart(bool is_told);
+  /// `moved`: m, from the old one to the new one; nothing where the old one meant nothing, or somebody has set the new
+  /// one
+  /// (`is_told`).
+  void restart(bool is_told, const Eigen::Vector2d& moved = Eigen::Vector2d::Zero());
   void reset() { *this = IntegrityMonitor(parameters_); }
 
  private:
@@ -85,11 +97,16 @@ class IntegrityMonitor {
   /// The first fix of the window that is so far off by itself.
   Stamp first_beyond(double sigmas) const;
   void end(Stamp now);
+  /// Share of the doubt's variance that is left now.
+  double doubt_left() const;
 
   IntegrityParameters parameters_;
   std::deque<FixMisfit> window_;
   std::optional<Contradiction> contradiction_;
   bool is_persistent_{false};
+  Eigen::Vector2d given_way_{Eigen::Vector2d::Zero()};  ///< m, that the estimate has gone to the fixes
+  Stamp given_way_at_{0};                               ///< when the contradiction ended
+  Stamp newest_{0};
   bool is_unconfirmed_{false};
   double time_to_detect_s_{std::numeric_limits<double>::quiet_NaN()};
   double time_to_recover_s_{std::numeric_limits<double>::quiet_NaN()};

@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <iomanip>
 #include <iostream>
+#include <iterator>
 #include <map>
 #include <nlohmann/json.hpp>
 
@@ -19,6 +20,7 @@
 #include "urban_gnss_localization/common/progress.hpp"
 #include "urban_gnss_localization/evaluation/report_json.hpp"
 #include "urban_gnss_localization/evaluation/tum.hpp"
+#include "urban_gnss_localization/geometry/angles.hpp"
 #include "urban_gnss_localization/pipeline/bias_responder.hpp"
 #include "urban_gnss_localization/ros/conversions.hpp"
 #include "urban_gnss_localization/ros/topics.hpp"
@@ -46,6 +48,7 @@ class Replay {
 
   void add_odometry(const nav_msgs::Odometry& message) {
     newest_ = to_stamp(message.header.stamp);
+    if (!begin_) begin_ = newest_;
     pipeline_.add_odometry(to_odometry_sample(message));
     settle();
   }
@@ -76,6 +79,14 @@ class Replay {
   }
 
   const Trajectory& estimate() const { return estimate_; }
+  /// s from the first odometry until the first estimate, and until the heading was known to 10 degrees; NaN: never.
+  double time_to_start_s() const { return estimate_.empty() ? kNever : since_begin(estimate_.front()); }
+  double time_to_heading_s() const {
+    const auto known = std::find_if(estimate_.begin(), estimate_.end(), [](const TimedPose& each) {
+      return std::sqrt(each.covariance(2, 2)) < kKnownHeading_rad;
+    });
+    return known == estimate_.end() ? kNever : since_begin(*known);
+  }
   const std::map<std::string, std::size_t>& decisions() const { return decisions_; }
   const LocalizationPipeline& pipeline() const { return pipeline_; }
 
@@ -130,11 +141,16 @@ class Replay {
     if (bag_.isOpen()) bag_.write("/" + topic, std::max(to_ros(stamp), ros::TIME_MIN), message);
   }
 
+  static constexpr double kNever = std::numeric_limits<double>::quiet_NaN();
+  static constexpr double kKnownHeading_rad = degrees_to_radians(10.0);
+  double since_begin(const TimedPose& pose) const { return to_seconds(pose.stamp - *begin_); }
+
   LocalizerNodeParameters shell_;
   LocalizationPipeline pipeline_;
   BiasResponder bias_responder_;
   rosbag::Bag bag_;
   Stamp newest_{0};
+  std::optional<Stamp> begin_;  ///< of the first odometry
   std::optional<GeodeticPosition> bag_datum_;
   Trajectory estimate_;
   Trajectory truth_;
@@ -173,6 +189,18 @@ struct Topics {
 };
 
 using Messages = std::vector<rosbag::MessageInstance>;
+
+/// The messages of the part of the bag that was asked for, and every datum before its end: that is latched.
+Messages cut_out(const Messages& messages, const ReplayOptions& options) {
+  Messages part;
+  std::copy_if(messages.begin(), messages.end(), std::back_inserter(part), [&](const auto& message) {
+    const double into_s = (message.getTime() - messages.front().getTime()).toSec();
+    const bool is_early = into_s < options.start_s && without_leading_slash(message.getTopic()) != topics::kDatum;
+    return !is_early && into_s <= options.start_s + options.duration_s;
+  });
+  if (part.empty()) throw std::runtime_error(options.input + ": has no message after --start");
+  return part;
+}
 
 /// Throws std::runtime_error, which lists what the bag has, where a topic that is needed has no message.
 void require_topics(const rosbag::Bag& bag, const Messages& messages, const ReplayOptions& options,
@@ -229,6 +257,8 @@ nlohmann::json metrics_of(const ReplayOptions& options, const ReplaySettings& se
   if (const auto& frame = replay.pipeline().frame()) {
     metrics["datum"] = {frame->datum().latitude_deg, frame->datum().longitude_deg, frame->datum().altitude_m};
   }
+  metrics["time_to_start_s"] = number_or_null(replay.time_to_start_s());
+  metrics["time_to_heading_s"] = number_or_null(replay.time_to_heading_s());
   if (const auto reference = replay.truth()) {
     metrics["errors"] = to_json(errors_at_truth(*reference, replay.estimate()).summary);
   }
@@ -249,8 +279,9 @@ void run(const ReplayOptions& options, const LocalizerRegistry& localizers) {
   if (!fs::exists(options.input)) throw std::runtime_error(options.input + ": no such bag");
   rosbag::Bag bag(options.input, rosbag::bagmode::Read);
   const Topics names(options);
-  const Messages messages = ordered_messages(bag, names.ordered());
-  require_topics(bag, messages, options, names);
+  const Messages whole = ordered_messages(bag, names.ordered());
+  require_topics(bag, whole, options, names);
+  const Messages messages = cut_out(whole, options);
 
   Replay replay(options, settings);
   Progress progress(messages.size(), "messages");
@@ -307,6 +338,9 @@ int replay_main(int argc, char** argv, const LocalizerRegistry& localizers) {
                  "LAT,LON,ALT (deg, deg, m); default: the bag's gps/datum, or the first fixes")
       ->delimiter(',')
       ->expected(3);
+  app.add_option("--start", options.start_s, "s into the bag, from where it is read")->check(CLI::NonNegativeNumber);
+  app.add_option("--duration", options.duration_s, "s of the bag that are read; default: all")
+      ->check(CLI::PositiveNumber);
   app.add_option("--seed", options.seed, "seed of the random numbers; default: as in the parameters");
   line.add_json(options.json_file);
   app.add_option("--tum", options.tum_file, "write the trajectory here (TUM format, ENU about the datum)");

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -27,6 +28,8 @@ struct ReplayOptions {
   bool wants_satellites = false;  ///< satellites_topic was asked for
   std::string truth_topic = topics::kTruth;
   std::vector<double> datum;
+  double start_s = 0.0;  ///< into the bag
+  double duration_s = std::numeric_limits<double>::infinity();
   int seed = -1;
   std::string json_file;
   std::string tum_file;
