@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <sstream>
+#include <stdexcept>
 
 namespace urban_gnss {
 
@@ -9,6 +11,34 @@ void WaypointControllerParameters::check(std::vector<std::string>& faults) const
   if (targets.size() % 2 != 0) {
     faults.push_back("targets: has " + std::to_string(targets.size()) + " numbers; must be x and y of each target");
   }
+  if (geographic.size() % 2 != 0) {
+    faults.push_back("geographic: has " + std::to_string(geographic.size()) +
+                     " numbers; must be latitude and longitude of each target");
+  }
+  for (std::size_t i = 0; i + 1 < geographic.size(); i += 2) {
+    for (const std::string& fault : position_faults({geographic[i], geographic[i + 1], 0.0})) {
+      faults.push_back("geographic: target " + std::to_string(i / 2) + ": " + fault);
+    }
+  }
+  if (!targets.empty() && !geographic.empty()) {
+    faults.push_back("geographic: there are targets in the map frame, too; give all as targets or all as geographic");
+  }
+}
+
+WaypointControllerParameters WaypointControllerParameters::in_map(const LocalFrame& map) const {
+  WaypointControllerParameters in_map = *this;
+  in_map.targets.clear();
+  in_map.geographic.clear();
+  for (std::size_t i = 0; i + 1 < geographic.size(); i += 2) {
+    const Eigen::Vector3d point = map.to_local({geographic[i], geographic[i + 1], map.datum().altitude_m});
+    if (!(point.norm() <= kFarthestTarget_m)) {
+      std::ostringstream out;
+      out << "geographic: target " << i / 2 << " is " << std::round(1e-3 * point.norm()) << " km from the datum";
+      throw std::runtime_error(out.str());
+    }
+    in_map.targets.insert(in_map.targets.end(), {point.x(), point.y()});
+  }
+  return in_map;
 }
 
 std::vector<Eigen::Vector2d> WaypointControllerParameters::target_points() const {

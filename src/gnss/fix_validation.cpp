@@ -4,6 +4,9 @@
 #include <algorithm>
 #include <cmath>
 #include <sstream>
+#include <utility>
+
+#include "urban_gnss_localization/gnss/position_hint.hpp"
 
 namespace urban_gnss {
 namespace {
@@ -18,6 +21,17 @@ void add_reason(FixOutcome& outcome, const std::string& reason) {
   outcome.reason += (outcome.reason.empty() ? "" : "; ") + reason;
 }
 
+std::string with_hint(const std::string& reason, const std::string& hint) {
+  return hint.empty() ? reason : reason + ": " + hint;
+}
+
+std::string place_text(double latitude, double longitude) {
+  std::ostringstream out;
+  out.precision(10);
+  out << "latitude " << latitude << ", longitude " << longitude;
+  return out.str();
+}
+
 struct Rejection {
   FixDecision decision;
   std::string reason;
@@ -28,15 +42,14 @@ std::optional<Rejection> reject_position(const RawFix& raw) {
   const auto& [latitude, longitude, altitude] = raw.position;
   (void)altitude;
   if (!std::isfinite(latitude) || !std::isfinite(longitude)) {
-    return Rejection{FixDecision::kRejectedNonFinite,
-                     "latitude " + number(latitude) + ", longitude " + number(longitude) + " is not finite"};
+    return Rejection{FixDecision::kRejectedNonFinite, place_text(latitude, longitude) + " is not finite"};
   }
   if (raw.stamp < Stamp::zero()) {
     return Rejection{FixDecision::kRejectedOutOfRange, "negative stamp " + number(to_seconds(raw.stamp)) + " s"};
   }
   if (!is_latitude(latitude) || !is_longitude(longitude)) {
     return Rejection{FixDecision::kRejectedOutOfRange,
-                     "latitude " + number(latitude) + ", longitude " + number(longitude) + " is no place"};
+                     with_hint(place_text(latitude, longitude) + " is no place", hint_of_no_place(raw.position))};
   }
   if (latitude == 0.0 && longitude == 0.0) {
     return Rejection{FixDecision::kRejectedOutOfRange, "latitude and longitude are both 0"};
@@ -46,6 +59,9 @@ std::optional<Rejection> reject_position(const RawFix& raw) {
 
 std::optional<Rejection> reject_stamp(Stamp stamp, std::optional<Stamp> last_stamp) {
   if (!last_stamp || stamp > *last_stamp) return std::nullopt;
+  if (stamp == Stamp::zero()) {
+    return Rejection{FixDecision::kRejectedStale, "header.stamp of gps/fix is 0: its driver must set it"};
+  }
   if (stamp == *last_stamp) return Rejection{FixDecision::kRejectedStale, "duplicate of the last fix's stamp"};
   return Rejection{FixDecision::kRejectedStale,
                    number(to_seconds(*last_stamp) - to_seconds(stamp)) + " s older than the last fix"};
@@ -58,7 +74,8 @@ std::optional<Rejection> reject_distance(const RawFix& raw, const LocalFrame& fr
   const double distance = frame.to_local(place).norm();
   if (distance <= max_distance) return std::nullopt;
   return Rejection{FixDecision::kRejectedOutOfRange,
-                   number(distance) + " m from the datum, farther than " + number(max_distance) + " m"};
+                   with_hint(number(distance) + " m from the datum, farther than " + number(max_distance) + " m",
+                             hint_of_far_place(raw.position, frame, max_distance))};
 }
 
 /// The declared horizontal covariance as standard deviations and correlation, which neither overflow nor underflow.
@@ -134,6 +151,17 @@ void FixValidationParameters::check(std::vector<std::string>& faults) const {
 
 bool is_usable_position(const RawFix& raw) { return !reject_position(raw); }
 
+std::optional<FixOutcome> reject_without_datum(const RawFix& raw, std::optional<Stamp> last_stamp) {
+  std::optional<Rejection> rejection = reject_position(raw);
+  if (!rejection) rejection = reject_stamp(raw.stamp, last_stamp);
+  if (!rejection) return std::nullopt;
+  FixOutcome outcome;
+  outcome.stamp = raw.stamp;
+  outcome.decision = rejection->decision;
+  outcome.reason = rejection->reason;
+  return outcome;
+}
+
 ValidatedFix validate_fix(const RawFix& raw, const LocalFrame& frame, std::optional<Stamp> last_stamp,
                           const FixValidationParameters& parameters) {
   ValidatedFix result;
@@ -141,10 +169,11 @@ ValidatedFix validate_fix(const RawFix& raw, const LocalFrame& frame, std::optio
   FixOutcome& outcome = result.outcome;
   outcome.stamp = raw.stamp;
 
-  std::optional<Rejection> rejection = reject_position(raw);
-  if (!rejection) rejection = reject_stamp(raw.stamp, last_stamp);
-  if (!rejection) rejection = reject_distance(raw, frame, parameters.max_distance_from_datum);
-  if (rejection) {
+  if (auto rejected = reject_without_datum(raw, last_stamp)) {
+    outcome = std::move(*rejected);
+    return result;
+  }
+  if (const auto rejection = reject_distance(raw, frame, parameters.max_distance_from_datum)) {
     outcome.decision = rejection->decision;
     outcome.reason = rejection->reason;
     return result;

@@ -1,10 +1,12 @@
-// The steering law of Nishida et al. as a node: odometry/filtered in, cmd_vel out. Parameters:
+// The steering law of Nishida et al. as a node: odometry/filtered in, cmd_vel out; also gps/datum in, where the targets
+// are geographic. Parameters:
 // WaypointControllerParameters and the two below; config/waypoint_controller.yaml documents each.
 
 #include <geometry_msgs/Twist.h>
 #include <nav_msgs/Odometry.h>
 #include <nav_msgs/Path.h>
 #include <ros/ros.h>
+#include <sensor_msgs/NavSatFix.h>
 
 #include "urban_gnss_localization/pipeline/stamp_monitor.hpp"
 #include "urban_gnss_localization/ros/conversions.hpp"
@@ -22,7 +24,7 @@ constexpr double kTimeJump_s = 1.0;
 class WaypointControllerNode {
  public:
   WaypointControllerNode(ros::NodeHandle& node, ros::NodeHandle& private_node)
-      : controller_(read(private_node)), stamps_(kTimeJump_s) {
+      : steering_(read(private_node)), controller_(fresh()), stamps_(kTimeJump_s) {
     command_publisher_ = node.advertise<geometry_msgs::Twist>(topics::kCommand, 10);
     target_publisher_ = node.advertise<visualization_msgs::MarkerArray>(topics::kTargets, 1, true);
     path_publisher_ = node.advertise<nav_msgs::Path>(topics::kTargetPath, 1, true);
@@ -30,22 +32,58 @@ class WaypointControllerNode {
                                  ros::TransportHints().tcpNoDelay());
     watchdog_ = node.createWallTimer(ros::WallDuration(parameters_.estimate_timeout),
                                      [this](const ros::WallTimerEvent&) { stop_if_blind(); });
-    if (controller_.targets().empty()) ROS_WARN_STREAM("no targets: the robot will stand");
+    if (is_geographic()) {
+      datum_subscriber_ = node.subscribe(topics::kDatum, 10, &WaypointControllerNode::on_datum, this);
+      five_second_timer_ = node.createWallTimer(ros::WallDuration(5.0), [this](const ros::WallTimerEvent&) {
+        if (!datum_) ROS_WARN_STREAM(what_is_awaited());
+      });
+      ROS_INFO_STREAM(what_is_awaited());
+    } else if (controller_.targets().empty()) {
+      ROS_WARN_STREAM("no targets: the robot will stand");
+    }
   }
 
  private:
-  WaypointController read(const ros::NodeHandle& private_node) {
+  WaypointControllerParameters read(const ros::NodeHandle& private_node) {
     read_private_parameters(private_node, parameters_);
-    return WaypointController(parameters_.steering, static_cast<std::size_t>(parameters_.first_target));
+    return parameters_.steering;
+  }
+
+  WaypointController fresh() const {
+    return WaypointController(steering_, static_cast<std::size_t>(parameters_.first_target));
+  }
+
+  bool is_geographic() const { return !parameters_.steering.geographic.empty(); }
+
+  std::string what_is_awaited() const {
+    return "geographic targets: waiting for the datum (" + datum_subscriber_.getTopic() + ": " +
+           std::to_string(datum_subscriber_.getNumPublishers()) + " publishers); the robot is not steered until then";
+  }
+
+  /// Places the geographic targets; anew, from the current one, where the map frame moved.
+  void on_datum(const sensor_msgs::NavSatFix& message) {
+    const GeodeticPosition datum = to_geodetic(message);
+    if (datum_ == datum) return;
+    try {
+      steering_ = parameters_.steering.in_map(LocalFrame(datum));
+    } catch (const std::exception& error) {
+      ROS_ERROR_STREAM(datum_subscriber_.getTopic() << " refused: " << error.what());
+      return;
+    }
+    controller_ = datum_ ? WaypointController(steering_, controller_.current_target()) : fresh();
+    datum_ = datum;
+    shown_.reset();
+    ROS_INFO_STREAM("the datum is known: " << controller_.targets().size() << " geographic targets");
   }
 
   void on_estimate(const nav_msgs::Odometry& message) {
+    if (is_geographic() && !datum_) return;
     const Pose2 estimate = to_pose2(message.pose.pose);
     const Stamp stamp = to_stamp(message.header.stamp);
     if (!is_finite(estimate)) return;
     const bool is_new = stamps_.accept(stamp, [this](Stamp) {
       ROS_WARN_STREAM("reset: the clock of the estimate jumped back");
-      controller_ = WaypointController(parameters_.steering, static_cast<std::size_t>(parameters_.first_target));
+      controller_ = fresh();
       shown_.reset();
       return true;
     });
@@ -88,7 +126,9 @@ class WaypointControllerNode {
   }
 
   WaypointControllerNodeParameters parameters_;
+  WaypointControllerParameters steering_;  ///< with the targets in the map frame
   WaypointController controller_;
+  std::optional<GeodeticPosition> datum_;  ///< of the geographic targets
   StampMonitor stamps_;
   std::optional<std::size_t> shown_;
   bool is_driving_{false};
@@ -97,7 +137,9 @@ class WaypointControllerNode {
   ros::Publisher target_publisher_;
   ros::Publisher path_publisher_;
   ros::Subscriber subscriber_;
+  ros::Subscriber datum_subscriber_;
   ros::WallTimer watchdog_;
+  ros::WallTimer five_second_timer_;
 };
 
 }  // namespace

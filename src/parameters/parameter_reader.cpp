@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <optional>
 #include <utility>
 
 namespace urban_gnss {
@@ -55,6 +56,22 @@ std::string text_of(const YAML::Node& node) {
   out.SetSeqFormat(YAML::Flow);
   out << node;
   return out.c_str();
+}
+
+/// The numbers of a list of lists of equal length, e.g. of pairs; nothing where it is none.
+std::optional<std::vector<double>> flattened(const YAML::Node& list) {
+  if (!list.IsDefined() || !list.IsSequence() || list.size() == 0) return std::nullopt;
+  std::vector<double> numbers;
+  for (const YAML::Node& row : list) {
+    if (!row.IsSequence() || row.size() != list[0].size()) return std::nullopt;
+    try {
+      const auto values = row.as<std::vector<double>>();
+      numbers.insert(numbers.end(), values.begin(), values.end());
+    } catch (const YAML::Exception&) {
+      return std::nullopt;
+    }
+  }
+  return numbers;
 }
 
 }  // namespace
@@ -145,7 +162,11 @@ void ParameterReader::on_integer(const ParameterKey& key, int& value, const Rang
 }
 
 void ParameterReader::on_list(const ParameterKey& key, std::vector<double>& value) {
-  if (!convert(key, value, "a list of numbers")) return;
+  if (const auto flat = flattened(find(key))) {
+    value = *flat;
+  } else if (!convert(key, value, "a list of numbers")) {
+    return;
+  }
   if (!std::all_of(value.begin(), value.end(), [](double element) { return std::isfinite(element); })) {
     bad_value(key, "must be finite numbers");
   }

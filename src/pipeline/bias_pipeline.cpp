@@ -58,8 +58,8 @@ void BiasPipeline::add_estimate(Stamp stamp, const Pose2& pose) {
 void BiasPipeline::add_fix(const RawFix& fix) {
   if (!frame_) return;
   // A receiver that does not know where it is may not know the time either. What is not new, the validation rejects.
-  if (is_usable_position(fix)) is_new(InputStream::kFixes, fix.stamp);
-  fixes_.add(fix);
+  if (is_usable_position(fix) && fix.stamp != Stamp::zero()) is_new(InputStream::kFixes, fix.stamp);
+  if (const auto rejected = fixes_.add(fix)) pass_on(*rejected);
   for (const FixOutcome& rejected : fixes_.validate(*frame_)) pass_on(rejected);
   process_fixes();
 }

@@ -3,20 +3,33 @@
 #include <utility>
 
 #include "limits.hpp"
+#include "urban_gnss_localization/gnss/position_hint.hpp"
 
 namespace urban_gnss {
 
-void FixQueue::add(const RawFix& fix) { push_bounded(raw_, fix); }
+std::optional<FixOutcome> FixQueue::add(const RawFix& fix) {
+  SaneFix sane = sanity_.add(fix);
+  auto rejected = reject_without_datum(fix, raw_.empty() ? last_stamp_ : raw_.back().fix.stamp);
+  if (!rejected) push_bounded(raw_, std::move(sane));
+  return rejected;
+}
 
 std::vector<FixOutcome> FixQueue::validate(const LocalFrame& frame) {
   std::vector<FixOutcome> rejected;
-  for (const RawFix& raw : std::exchange(raw_, {})) {
-    ValidatedFix fix = validate_fix(raw, frame, last_stamp_, parameters_);
-    if (is_rejected(fix.outcome.decision)) {
-      rejected.push_back(std::move(fix.outcome));
+  for (const SaneFix& raw : std::exchange(raw_, {})) {
+    ValidatedFix fix = validate_fix(raw.fix, frame, last_stamp_, parameters_);
+    FixOutcome& outcome = fix.outcome;
+    if (is_rejected(outcome.decision)) {
+      sanity_.note_misplaced(hint_of_far_place(raw.fix.position, frame, parameters_.max_distance_from_datum));
+      rejected.push_back(std::move(outcome));
       continue;
     }
-    last_stamp_ = raw.stamp;
+    if (!raw.reason.empty()) {
+      if (outcome.decision == FixDecision::kAccepted) outcome.decision = FixDecision::kInflated;
+      outcome.covariance_clamped = true;
+      outcome.reason = raw.reason + (outcome.reason.empty() ? "" : "; ") + outcome.reason;
+    }
+    last_stamp_ = raw.fix.stamp;
     push_bounded(validated_, std::move(fix));
   }
   return rejected;
@@ -26,6 +39,21 @@ ValidatedFix FixQueue::pop() {
   ValidatedFix fix = std::move(validated_.front());
   validated_.pop_front();
   return fix;
+}
+
+std::vector<PipelineEvent> FixQueue::take_events() {
+  using Level = PipelineEvent::Level;
+  std::vector<PipelineEvent> events;
+  for (FixSanity::News& news : sanity_.take_news()) {
+    events.push_back({news.is_warning ? Level::kWarn : Level::kInfo, std::move(news.text)});
+  }
+  return events;
+}
+
+void FixQueue::reset() {
+  raw_.clear();
+  validated_.clear();
+  last_stamp_.reset();
 }
 
 }  // namespace urban_gnss

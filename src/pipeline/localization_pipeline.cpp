@@ -216,9 +216,16 @@ void LocalizationPipeline::add_fix(const RawFix& fix) {
     decide_stale(std::move(outcome), "more than " + seconds_text(kMaxAhead_s) + " ahead of the odometry");
     return;
   }
-  // A receiver that does not know where it is may not know the time either. What is not new, the validation rejects.
-  if (is_usable_position(fix)) is_new(InputStream::kFixes, fix.stamp);
-  fixes_.add(fix);
+  // A receiver that does not know where it is may not know the time either, and a stamp that was not set is no time.
+  // What is not new, the queue rejects.
+  if (is_usable_position(fix) && fix.stamp != Stamp::zero()) is_new(InputStream::kFixes, fix.stamp);
+  const auto rejected = fixes_.add(fix);
+  for (PipelineEvent& mistake : fixes_.take_events()) events_.push_back(std::move(mistake));
+  if (rejected) {
+    decide(*rejected);
+  } else if (!frame()) {
+    reporter_.note_waiting_fix(fix.stamp);
+  }
   if (!frame()) {
     datum_.add(fix);
     if (frame()) event(Level::kInfo, datum_.describe());
@@ -416,6 +423,7 @@ LocalizationReport LocalizationPipeline::report() const {
   status.waiting_for = waiting_for();
   status.bias_radius_m = biases_.radius_m();
   status.complaint = complaint();
+  status.receiver_note = fixes_.complaint();
   status.time_to_detect_s = integrity_.time_to_detect_s();
   status.time_to_recover_s = integrity_.time_to_recover_s();
   status.fix_delay_s = delay_.delay_s();
@@ -433,9 +441,10 @@ std::string LocalizationPipeline::complaint() const {
 std::string LocalizationPipeline::waiting_for() const {
   if (initialized()) return {};
   if (history_.empty()) return "odometry";
-  if (!frame()) return "the datum: " + datum_.waiting_for();
-  if (!fixes_.last_stamp()) return "a usable fix";
-  return "the start: " + start_.waiting_for();
+  const std::string rejected = reporter_.last_rejection();
+  if (!frame()) return "the datum: " + datum_.waiting_for() + rejected;
+  if (!fixes_.last_stamp()) return "a usable fix" + rejected;
+  return "the start: " + start_.waiting_for() + rejected;
 }
 
 std::vector<LocalizationOutput> LocalizationPipeline::take_outputs() { return std::exchange(outputs_, {}); }

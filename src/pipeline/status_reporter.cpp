@@ -56,12 +56,25 @@ void StatusReporter::note_start_fix(const FixOutcome& outcome, bool is_start) {
   if (is_start) last_used_ = outcome.stamp;
 }
 
+void StatusReporter::note_waiting_fix(Stamp stamp) {
+  counts_.last_fix = {};
+  counts_.last_fix.stamp = stamp;
+  counts_.last_fix.reason = "waits for the datum";
+}
+
+std::string StatusReporter::last_rejection() const {
+  const FixOutcome& last = counts_.last_fix;
+  if (!is_rejected(last.decision)) return {};
+  return std::string("; the last fix was ") + to_string(last.decision) + ": " + last.reason;
+}
+
 LocalizationReport StatusReporter::report(const PipelineStatus& status, const Localizer& localizer) const {
   LocalizationReport report = counts_;
   report.time_to_detect_s = status.time_to_detect_s;
   report.time_to_recover_s = status.time_to_recover_s;
   report.fix_delay_s = status.fix_delay_s;
   report.bias_radius_m = status.bias_radius_m;
+  report.receiver_note = status.receiver_note;
   if (status.last_odometry && last_used_) report.fix_age_s = to_seconds(*status.last_odometry - *last_used_);
   if (status.last_odometry && status.last_fix) {
     report.odometry_age_s = std::max(0.0, to_seconds(*status.last_fix - *status.last_odometry));
@@ -88,6 +101,7 @@ void StatusReporter::judge(const PipelineStatus& status, LocalizationReport& rep
                                 : LocalizationState::kTracking;
   report.reason = complaint(status, report);
   report.healthy = report.reason.empty();
+  if (report.healthy) report.reason = status.receiver_note;
 }
 
 std::string StatusReporter::complaint(const PipelineStatus& status, const LocalizationReport& report) const {

@@ -52,6 +52,7 @@ RawFix to_raw_fix(const sensor_msgs::NavSatFix& message) {
   RawFix fix;
   fix.stamp = to_stamp(message.header.stamp);
   fix.has_fix = message.status.status >= sensor_msgs::NavSatStatus::STATUS_FIX;
+  fix.has_sbas = message.status.status == sensor_msgs::NavSatStatus::STATUS_SBAS_FIX;
   fix.position = to_geodetic(message);
   for (int row = 0; row < 3; ++row) {
     for (int column = 0; column < 3; ++column) {
@@ -174,6 +175,20 @@ nav_msgs::Odometry to_message(const LocalizationOutput& output, const Frames& fr
   }
   message.twist.twist.linear.x = output.twist.speed_mps;
   message.twist.twist.angular.z = output.twist.yaw_rate_radps;
+  return message;
+}
+
+sensor_msgs::NavSatFix to_fix_message(const LocalizationOutput& output, const LocalFrame& map, const Frames& frames) {
+  GeodeticPosition place = map.to_geodetic({output.estimate.pose.x, output.estimate.pose.y, 0.0});
+  place.altitude_m = map.datum().altitude_m;  // the plane z = 0 rises above the ellipsoid with the distance
+  sensor_msgs::NavSatFix message = to_message(place, to_ros(output.stamp), frames.base_link);
+  for (int row = 0; row < 2; ++row) {
+    for (int column = 0; column < 2; ++column) {
+      message.position_covariance[static_cast<std::size_t>(3 * row + column)] = output.estimate.covariance(row, column);
+    }
+  }
+  message.position_covariance[8] = kUnobservedVariance;
+  message.position_covariance_type = sensor_msgs::NavSatFix::COVARIANCE_TYPE_KNOWN;
   return message;
 }
 

@@ -23,6 +23,7 @@ LocalizerNode::LocalizerNode(ros::NodeHandle& node, ros::NodeHandle& private_nod
       on_output_(std::move(on_output)),
       diagnostics_(ros::NodeHandle(), private_node) {
   estimate_publisher_ = node.advertise<nav_msgs::Odometry>(topics::kEstimate, 100);
+  fix_publisher_ = node.advertise<sensor_msgs::NavSatFix>(topics::kFilteredFix, 100);
   status_publisher_ = private_node.advertise<urban_gnss_localization::LocalizationStatus>(topics::kStatus, 100);
   datum_publisher_ = node.advertise<sensor_msgs::NavSatFix>(topics::kDatum, 1, true);
 
@@ -45,8 +46,13 @@ LocalizerNode::LocalizerNode(ros::NodeHandle& node, ros::NodeHandle& private_nod
   }
   services_.push_back(node.advertiseService("set_pose", &Self::set_pose, this));
   services_.push_back(node.advertiseService("datum", &Self::set_datum, this));
-  services_.push_back(node.advertiseService("toLL", &Self::to_ll, this));
-  services_.push_back(node.advertiseService("fromLL", &Self::from_ll, this));
+  using namespace urban_gnss_localization;
+  services_.push_back(node.advertiseService("toLL", &Self::convert<ToLL::Request, ToLL::Response>, this));
+  services_.push_back(node.advertiseService("fromLL", &Self::convert<FromLL::Request, FromLL::Response>, this));
+  services_.push_back(
+      node.advertiseService("toLLArray", &Self::convert<ToLLArray::Request, ToLLArray::Response>, this));
+  services_.push_back(
+      node.advertiseService("fromLLArray", &Self::convert<FromLLArray::Request, FromLLArray::Response>, this));
   services_.push_back(private_node.advertiseService("reset", &Self::reset, this));
 
   antenna_known_ = !parameters_.antenna_offset_from_tf || parameters_.localization.input.antenna().norm() > 0.0;
@@ -159,37 +165,6 @@ bool LocalizerNode::set_datum(urban_gnss_localization::SetDatum::Request& reques
   return true;
 }
 
-bool LocalizerNode::to_ll(urban_gnss_localization::ToLL::Request& request,
-                          urban_gnss_localization::ToLL::Response& response) {
-  if (!pipeline_.frame()) {
-    response.message = "there is no datum yet";
-    return true;
-  }
-  const GeodeticPosition place =
-      pipeline_.frame()->to_geodetic({request.map_point.x, request.map_point.y, request.map_point.z});
-  response.success = std::isfinite(place.latitude_deg);
-  if (!response.success) response.message = "map_point is not finite";
-  response.latitude = place.latitude_deg;
-  response.longitude = place.longitude_deg;
-  response.altitude = place.altitude_m;
-  return true;
-}
-
-bool LocalizerNode::from_ll(urban_gnss_localization::FromLL::Request& request,
-                            urban_gnss_localization::FromLL::Response& response) {
-  if (!pipeline_.frame()) {
-    response.message = "there is no datum yet";
-    return true;
-  }
-  const Eigen::Vector3d point = pipeline_.frame()->to_local({request.latitude, request.longitude, request.altitude});
-  response.success = point.allFinite();
-  if (!response.success) response.message = "there is no such place";
-  response.map_point.x = point.x();
-  response.map_point.y = point.y();
-  response.map_point.z = point.z();
-  return true;
-}
-
 bool LocalizerNode::reset(std_srvs::Empty::Request&, std_srvs::Empty::Response&) {
   pipeline_.reset("requested");
   publish_results();
@@ -202,6 +177,7 @@ void LocalizerNode::publish_results() {
   for (const LocalizationOutput& output : pipeline_.take_outputs()) {
     ++outputs_;
     estimate_publisher_.publish(to_message(output, parameters_.frames));
+    fix_publisher_.publish(to_fix_message(output, *pipeline_.frame(), parameters_.frames));
     if (parameters_.publish_tf) {
       broadcaster_.sendTransform(to_map_to_odom(output, parameters_.frames, parameters_.transform_time_offset));
     }
@@ -277,10 +253,11 @@ void LocalizerNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status
   const auto level = report.healthy                             ? DiagnosticStatus::OK
                      : report.state == LocalizationState::kLost ? DiagnosticStatus::ERROR
                                                                 : DiagnosticStatus::WARN;
-  status.summary(level, report.healthy ? "tracking" : report.reason);
+  status.summary(level, report.healthy && report.reason.empty() ? "tracking" : report.reason);
   status.add("state", to_string(report.state));
   status.add("mode", pipeline_.localizer().mode());
   status.add("last fix", to_string(report.last_fix.decision));
+  status.add("receiver", report.receiver_note.empty() ? "no known mistake" : report.receiver_note);
   status.add("fixes used", report.fixes_used);
   status.add("fixes rejected", report.fixes_rejected);
   status.add("fix age (s)", report.fix_age_s);

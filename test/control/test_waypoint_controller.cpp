@@ -93,6 +93,49 @@ TEST(WaypointController, HalfATargetIsAFault) {
   EXPECT_EQ(faults.size(), 1u);
 }
 
+TEST(WaypointController, GeographicTargetsAreThoseOfTheMap) {
+  const LocalFrame map({48.1374, 11.5755, 520.0});
+  WaypointControllerParameters parameters;
+  std::vector<Eigen::Vector2d> expected{{30.0, -20.0}, {0.0, 0.0}, {-150.0, 4000.0}};
+  for (const Eigen::Vector2d& point : expected) {
+    const GeodeticPosition place = map.to_geodetic({point.x(), point.y(), 0.0});
+    parameters.geographic.insert(parameters.geographic.end(), {place.latitude_deg, place.longitude_deg});
+  }
+  EXPECT_TRUE(faults_of(parameters).empty());
+  EXPECT_TRUE(WaypointController(parameters).targets().empty()) << "without a map there are none";
+  const WaypointControllerParameters placed = parameters.in_map(map);
+  EXPECT_TRUE(placed.geographic.empty());
+  const std::vector<Eigen::Vector2d> points = placed.target_points();
+  ASSERT_EQ(points.size(), expected.size());
+  for (std::size_t i = 0; i < points.size(); ++i) EXPECT_LT((points[i] - expected[i]).norm(), 0.01) << i;
+  EXPECT_EQ(placed.speed, parameters.speed);
+}
+
+TEST(WaypointController, GeographicTargetsAreRefusedWithTheirIndex) {
+  const auto fault = [](const std::vector<double>& targets, const std::vector<double>& geographic) {
+    WaypointControllerParameters parameters;
+    parameters.targets = targets;
+    parameters.geographic = geographic;
+    const std::vector<std::string> faults = faults_of(parameters);
+    return faults.size() == 1 ? faults.front() : std::to_string(faults.size()) + " faults";
+  };
+  EXPECT_NE(fault({1.0, 2.0}, {48.1, 11.5}).find("all as targets or all as geographic"), std::string::npos);
+  EXPECT_NE(fault({}, {48.1}).find("latitude and longitude of each"), std::string::npos);
+  EXPECT_NE(fault({}, {48.1, 11.5, 91.0, 11.5}).find("target 1: latitude = 91"), std::string::npos);
+  EXPECT_NE(fault({}, {48.1, 190.0}).find("target 0: longitude = 190"), std::string::npos);
+}
+
+TEST(WaypointController, ATargetThatNoRobotReachesIsRefused) {
+  WaypointControllerParameters parameters;
+  parameters.geographic = {48.14, 11.58, 11.58, 48.14};  // the second is swapped
+  try {
+    parameters.in_map(LocalFrame({48.1374, 11.5755, 520.0}));
+    FAIL();
+  } catch (const std::runtime_error& error) {
+    EXPECT_NE(std::string(error.what()).find("target 1 is "), std::string::npos) << error.what();
+  }
+}
+
 // The paper's loop without any noise: 10 m/s, 100 Hz, eight targets on a ring of 15 m.
 TEST(WaypointController, ClosedLoopPassesTheEightTargets) {
   const YAML::Node yaml = YAML::LoadFile(package_directory() + "/config/paper_field/waypoint_controller.yaml");

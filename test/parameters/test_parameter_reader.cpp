@@ -71,6 +71,16 @@ TEST(Parameters, ReadsEveryKind) {
   EXPECT_EQ(parameters.offset, (std::vector<double>{4.0, 5.0, 6.0}));
 }
 
+TEST(Parameters, AListOfListsOfOneLengthIsOneList) {
+  const auto [parameters, faults] = read("{offset: [[1, 2], [3, 4], [5, 6]]}");
+  EXPECT_TRUE(faults.empty());
+  EXPECT_EQ(parameters.offset, (std::vector<double>{1.0, 2.0, 3.0, 4.0, 5.0, 6.0}));
+  for (const char* bad : {"[[1, 2], [3]]", "[[1, 2], 3]", "[[1, x], [2, 3]]", "[[[1]], [[2]]]"}) {
+    EXPECT_NE(fault("{offset: " + std::string(bad) + "}").find("must be a list of numbers"), std::string::npos) << bad;
+  }
+  EXPECT_NE(fault("{offset: [[1, .nan]]}").find("finite"), std::string::npos);
+}
+
 TEST(Parameters, WhatIsAbsentKeepsItsDefault) {
   for (const char* yaml : {"{mass_kg: 3}", "{}", "", "~"}) {
     const auto [parameters, faults] = read(yaml);

@@ -10,7 +10,7 @@ RawFix at(double time, double x = 0.0) { return raw_fix(from_seconds(time), {x, 
 
 TEST(FixQueue, FixesWaitForTheDatumAndKeepTheirOrder) {
   FixQueue queue({});
-  for (const double time : {1.0, 2.0, 3.0}) queue.add(at(time, 10.0 * time));
+  for (const double time : {1.0, 2.0, 3.0}) EXPECT_FALSE(queue.add(at(time, 10.0 * time)));
   EXPECT_EQ(queue.next(), nullptr);
   EXPECT_FALSE(queue.last_stamp());
   EXPECT_TRUE(queue.validate(kFrame).empty());
@@ -24,21 +24,89 @@ TEST(FixQueue, FixesWaitForTheDatumAndKeepTheirOrder) {
   EXPECT_EQ(queue.last_stamp(), from_seconds(3.0)) << "of those that have gone, too";
 }
 
-TEST(FixQueue, RejectedFixesWaitNoLongerAndAreToldOnce) {
+TEST(FixQueue, WhatNoDatumCanSaveIsRejectedAtOnce) {
   FixQueue queue({});
   RawFix without = at(2.0);
   without.has_fix = false;
-  queue.add(at(1.0));
-  queue.add(without);
-  queue.add(at(1.0));  // came twice
+  EXPECT_FALSE(queue.add(at(1.0)));
+  const auto no_fix = queue.add(without);
+  ASSERT_TRUE(no_fix);
+  EXPECT_EQ(no_fix->decision, FixDecision::kRejectedStatus);
+  EXPECT_EQ(no_fix->stamp, from_seconds(2.0));
+  const auto came_twice = queue.add(at(1.0));
+  ASSERT_TRUE(came_twice);
+  EXPECT_EQ(came_twice->decision, FixDecision::kRejectedStale);
+  EXPECT_TRUE(queue.validate(kFrame).empty());
+  const auto after_validation = queue.add(at(0.5));
+  ASSERT_TRUE(after_validation);
+  EXPECT_EQ(after_validation->decision, FixDecision::kRejectedStale);
+  queue.pop();
+  EXPECT_EQ(queue.next(), nullptr);
+}
+
+TEST(FixQueue, RejectedFixesWaitNoLongerAndAreToldOnce) {
+  FixQueue queue({});
+  RawFix far = at(2.0);
+  far.position.latitude_deg += 10.0;
+  EXPECT_FALSE(queue.add(at(1.0)));
+  EXPECT_FALSE(queue.add(far));
   const std::vector<FixOutcome> rejected = queue.validate(kFrame);
-  ASSERT_EQ(rejected.size(), 2u);
-  EXPECT_EQ(rejected[0].decision, FixDecision::kRejectedStatus);
+  ASSERT_EQ(rejected.size(), 1u);
+  EXPECT_EQ(rejected[0].decision, FixDecision::kRejectedOutOfRange);
   EXPECT_EQ(rejected[0].stamp, from_seconds(2.0));
-  EXPECT_EQ(rejected[1].decision, FixDecision::kRejectedStale);
   EXPECT_TRUE(queue.validate(kFrame).empty());
   queue.pop();
   EXPECT_EQ(queue.next(), nullptr);
+}
+
+TEST(FixQueue, AStampThatIsNotSetIsNamed) {
+  FixQueue queue({});
+  EXPECT_FALSE(queue.add(at(0.0))) << "a simulation may begin at 0";
+  const auto second = queue.add(at(0.0));
+  ASSERT_TRUE(second);
+  EXPECT_EQ(second->decision, FixDecision::kRejectedStale);
+  EXPECT_NE(second->reason.find("header.stamp of gps/fix is 0"), std::string::npos) << second->reason;
+}
+
+TEST(FixQueue, AMistakeOfTheDriverIsSaidOnceAndItsCovarianceReplaced) {
+  FixQueue queue({});
+  std::vector<PipelineEvent> events;
+  FixOutcome last;
+  for (int k = 1; k <= 60; ++k) {
+    if (k == 30) queue.reset();
+    const double hdop = 0.8 + 0.1 * (k % 4);
+    RawFix fix = at(k);
+    fix.covariance = (hdop * hdop * Eigen::Vector3d(1.0, 1.0, 4.0)).asDiagonal();
+    fix.covariance_type = CovarianceType::kApproximated;
+    queue.add(fix);
+    queue.validate(kFrame);
+    for (PipelineEvent& event : queue.take_events()) events.push_back(std::move(event));
+    const ValidatedFix validated = queue.pop();
+    if (k > 10) EXPECT_NEAR(validated.fix.covariance(0, 0), 16.0 * hdop * hdop, 1e-9);
+    last = validated.outcome;
+  }
+  ASSERT_EQ(events.size(), 1u) << "also across a reset";
+  EXPECT_EQ(events.front().level, PipelineEvent::Level::kWarn);
+  EXPECT_EQ(last.decision, FixDecision::kInflated);
+  EXPECT_TRUE(last.covariance_clamped);
+  EXPECT_EQ(last.reason, "declared covariance replaced: HDOP^2 as variance");
+  EXPECT_EQ(queue.complaint(), "gps/fix has HDOP^2 as variance");
+}
+
+TEST(FixQueue, AFarFixIsExplainedOnceItIsNoAccident) {
+  FixQueue queue({});
+  std::vector<PipelineEvent> events;
+  for (int k = 1; k <= 5; ++k) {
+    RawFix south = at(k);
+    south.position.latitude_deg *= -1.0;
+    EXPECT_FALSE(queue.add(south));
+    const std::vector<FixOutcome> rejected = queue.validate(kFrame);
+    ASSERT_EQ(rejected.size(), 1u);
+    EXPECT_NE(rejected[0].reason.find("the sign of the latitude"), std::string::npos) << rejected[0].reason;
+    for (PipelineEvent& event : queue.take_events()) events.push_back(std::move(event));
+  }
+  ASSERT_EQ(events.size(), 1u);
+  EXPECT_NE(events.front().text.find("the sign of the latitude"), std::string::npos);
 }
 
 TEST(FixQueue, ParametersAreThoseOfTheValidation) {

@@ -74,6 +74,18 @@ TEST(StatusReporter, BeforeTheStartTheStateIsWhatIsMissing) {
   EXPECT_EQ(reporter.report(status, FakeLocalizer()).reason, "waiting for something");
 }
 
+TEST(StatusReporter, AMistakeOfTheReceiverIsSaidWhereAllElseIsWell) {
+  Well well;
+  well.status.receiver_note = "gps/fix has HDOP^2 as variance";
+  EXPECT_TRUE(well.report().healthy);
+  EXPECT_EQ(well.report().reason, "gps/fix has HDOP^2 as variance");
+  EXPECT_EQ(well.report().receiver_note, "gps/fix has HDOP^2 as variance");
+  well.localizer.state.covariance(2, 2) = 0.16;
+  EXPECT_FALSE(well.report().healthy);
+  EXPECT_EQ(well.report().reason, "heading not known yet");
+  EXPECT_EQ(well.report().receiver_note, "gps/fix has HDOP^2 as variance");
+}
+
 TEST(StatusReporter, HealthNamesWhatIsWrongFirst) {
   Well well;
   EXPECT_TRUE(well.report().healthy) << well.report().reason;

@@ -68,6 +68,14 @@ class NodesTest(unittest.TestCase):
         self.assertIn("scenario: a city needs the file of a scenario", refuse())
         self.assertIn("did you mean follow_route?", refuse("_scenario:=x", "_follow_rout:=true"))
 
+    def test_geographic_and_map_targets_do_not_mix(self):
+        rospy.set_param("tested_waypoint_controller_node", {"targets": [1.0, 2.0], "geographic": [[48.1, 11.5]]})
+        done = subprocess.run(command("waypoint_controller_node"), stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+                              universal_newlines=True, timeout=30)
+        rospy.delete_param("tested_waypoint_controller_node")
+        self.assertEqual(done.returncode, 1, done.stdout)
+        self.assertIn("give all as targets or all as geographic", done.stdout)
+
     def test_interrupt_ends_the_node_cleanly(self):
         for node in NODES:
             with self.subTest(node=node):

@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "urban_gnss_localization/common/parameters.hpp"
+#include "urban_gnss_localization/geometry/local_frame.hpp"
 #include "urban_gnss_localization/motion/motion_model.hpp"
 
 namespace urban_gnss {
@@ -15,6 +16,7 @@ struct WaypointControllerParameters {
   double switch_distance{0.5};
   int laps{0};
   std::vector<double> targets;
+  std::vector<double> geographic;
 
   void visit(ParameterVisitor& v) {
     v.basic()("speed", speed, positive(), "m/s", "constant speed v, eq. (37)");
@@ -27,10 +29,18 @@ struct WaypointControllerParameters {
               "distance from estimate to target at which the next target becomes current");
     v.basic()("laps", laps, non_negative(), "", "number of laps after which the robot stops; 0: never");
     v.basic()("targets", targets, "m", "targets x1, y1, x2, y2, ... in the map frame; empty: the robot stands");
+    v.basic()("geographic", geographic, "deg",
+              "targets as latitude and longitude, [[48.1, 11.5], ...], in place of `targets`; they wait for gps/datum");
   }
   void check(std::vector<std::string>& faults) const;
 
+  /// `targets` as points (m).
   std::vector<Eigen::Vector2d> target_points() const;
+  /// The same with `geographic` as `targets`, on the ground at the datum's altitude. Throws std::runtime_error where
+  /// one is farther from the datum than kFarthestTarget_m, which a robot does not drive. Requires parameters without
+  /// faults.
+  WaypointControllerParameters in_map(const LocalFrame& map) const;
+  static constexpr double kFarthestTarget_m = 1e5;
 };
 
 /// Nishida et al. eq. (36)-(38): steers for one target after the other on the estimated pose. In (36) the bearing is

@@ -18,6 +18,7 @@ struct RawFix {
   GeodeticPosition position;
   Eigen::Matrix3d covariance{Eigen::Matrix3d::Zero()};  ///< ENU, m^2
   CovarianceType covariance_type{CovarianceType::kUnknown};
+  bool has_sbas{false};  ///< corrected by SBAS, as the receiver says (sensor_msgs/NavSatStatus::STATUS_SBAS_FIX)
 };
 
 /// A receiver's velocity from Doppler shifts, as it reports it, nothing checked.

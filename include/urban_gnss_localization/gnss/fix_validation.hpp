@@ -45,12 +45,16 @@ struct ValidatedFix {
 /// a place, and are not both exactly 0, which is what receivers report before they know (else kRejectedOutOfRange).
 bool is_usable_position(const RawFix& raw);
 
+/// What is decided of a fix that cannot be used wherever the datum is: is_usable_position() refuses it, or its stamp is
+/// not newer than `last_stamp` (kRejectedStale). Nothing where it can.
+std::optional<FixOutcome> reject_without_datum(const RawFix& raw, std::optional<Stamp> last_stamp);
+
 /// Decides whether a fix can be used at all, and transforms it to the map frame with a usable covariance: finite and
 /// positive definite for every input. Never throws because of the input.
 ///
-/// The first check that fails decides: those of is_usable_position() in their order, then the stamp is newer than
-/// `last_stamp` (else kRejectedStale), then the distance from the datum (else kRejectedOutOfRange). An altitude that no
-/// receiver on the ground can have does not reject a horizontal fix: the datum's is used.
+/// The first check that fails decides: those of reject_without_datum(), then the distance from the datum (else
+/// kRejectedOutOfRange). An altitude that no receiver on the ground can have does not reject a horizontal fix: the
+/// datum's is used.
 ///
 /// The covariance is the declared horizontal block times `fix_covariance_scale`; its off-diagonal elements are not
 /// declared, and not used, where the type is kDiagonalKnown. Where the type is kUnknown, or the block is not finite or

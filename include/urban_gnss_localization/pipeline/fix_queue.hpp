@@ -2,20 +2,25 @@
 
 #include <deque>
 #include <optional>
+#include <string>
 #include <vector>
 
+#include "urban_gnss_localization/gnss/fix_sanity.hpp"
 #include "urban_gnss_localization/gnss/fix_validation.hpp"
+#include "urban_gnss_localization/pipeline/pipeline_event.hpp"
 
 namespace urban_gnss {
 
 /// Fixes that wait, in the order in which they came: as the receiver reports them until there is a datum, then
-/// validated until what belongs to them is there. Of too many that wait, the oldest are dropped.
+/// validated until what belongs to them is there. Of too many that wait, the oldest are dropped. Known mistakes of
+/// drivers are found on the way (FixSanity).
 class FixQueue {
  public:
   /// Requires parameters without faults.
-  explicit FixQueue(const FixValidationParameters& parameters) : parameters_(parameters) {}
+  explicit FixQueue(const FixValidationParameters& parameters) : parameters_(parameters), sanity_(parameters) {}
 
-  void add(const RawFix& fix);
+  /// Returns what was decided of the fix where it cannot be used wherever the datum is; it does not wait then.
+  std::optional<FixOutcome> add(const RawFix& fix);
   /// Validates those that waited for the datum. Returns what was decided of those that are rejected, which wait no
   /// more.
   std::vector<FixOutcome> validate(const LocalFrame& frame);
@@ -28,11 +33,18 @@ class FixQueue {
   /// Of the fix that was validated last; nothing before the first.
   const std::optional<Stamp>& last_stamp() const { return last_stamp_; }
 
-  void reset() { *this = FixQueue(parameters_); }
+  /// Mistakes of the driver, each once, also across reset().
+  std::vector<PipelineEvent> take_events();
+  /// What is wrong with the covariance of the last fixes, for people; empty where nothing is.
+  std::string complaint() const { return sanity_.complaint(); }
+
+  /// Forgets the fixes.
+  void reset();
 
  private:
   FixValidationParameters parameters_;
-  std::deque<RawFix> raw_;
+  FixSanity sanity_;
+  std::deque<SaneFix> raw_;
   std::deque<ValidatedFix> validated_;
   std::optional<Stamp> last_stamp_;
 };

@@ -39,7 +39,8 @@ const char* to_string(LocalizationState state);
 struct LocalizationReport {
   LocalizationState state{LocalizationState::kWaitingForOdometry};
   bool healthy{false};
-  std::string reason;
+  std::string reason;         ///< why not healthy; where healthy, the receiver's note
+  std::string receiver_note;  ///< what is wrong with its covariances, but was allowed for; empty where nothing is
   FixOutcome last_fix;
   std::uint64_t fixes_used{0};
   std::uint64_t fixes_rejected{0};
@@ -72,6 +73,7 @@ struct PipelineStatus {
   double time_to_detect_s{std::numeric_limits<double>::quiet_NaN()};
   double time_to_recover_s{std::numeric_limits<double>::quiet_NaN()};
   double fix_delay_s{0.0};
+  std::string receiver_note;  ///< what is wrong with the receiver's covariances; empty where nothing is
 };
 
 /// Counts what was decided, and says how a pipeline and its localizer are.
@@ -86,6 +88,10 @@ class StatusReporter {
   void count(const FixOutcome& outcome);
   /// A fix was not examined, as it went into the start; `is_start`: the localizer started with it.
   void note_start_fix(const FixOutcome& outcome, bool is_start);
+  /// A fix waits for the datum.
+  void note_waiting_fix(Stamp stamp);
+  /// Why the last fix was rejected, as the rest of a sentence on what is waited for; empty where it was not.
+  std::string last_rejection() const;
   void count_velocity() { ++counts_.velocities_used; }
 
   LocalizationReport report(const PipelineStatus& status, const Localizer& localizer) const;

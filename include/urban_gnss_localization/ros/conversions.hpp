@@ -82,6 +82,10 @@ TimedPose to_timed_pose(const nav_msgs::Odometry& message);
 /// variance `kUnobservedVariance`.
 nav_msgs::Odometry to_message(const LocalizationOutput& output, const Frames& frames);
 inline constexpr double kUnobservedVariance = 1e6;
+/// The estimate as a fix, for map viewers, as robot_localization's navsat_transform_node publishes it: latitude and
+/// longitude of the base, and their covariance (m^2, the map's east and north). The altitude is the datum's, with the
+/// variance `kUnobservedVariance`, since a planar filter does not estimate it. `map` is the map frame.
+sensor_msgs::NavSatFix to_fix_message(const LocalizationOutput& output, const LocalFrame& map, const Frames& frames);
 
 /// map -> odom, valid until `offset_s` after the output's stamp.
 geometry_msgs::TransformStamped to_map_to_odom(const LocalizationOutput& output, const Frames& frames, double offset_s);

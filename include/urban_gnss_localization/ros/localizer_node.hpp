@@ -11,12 +11,10 @@
 #include <tf2_ros/transform_broadcaster.h>
 #include <tf2_ros/transform_listener.h>
 #include <topic_tools/shape_shifter.h>
-#include <urban_gnss_localization/FromLL.h>
 #include <urban_gnss_localization/GpsBias.h>
 #include <urban_gnss_localization/SatelliteArray.h>
 #include <urban_gnss_localization/SetDatum.h>
 #include <urban_gnss_localization/SetPose.h>
-#include <urban_gnss_localization/ToLL.h>
 
 #include <functional>
 #include <memory>
@@ -25,6 +23,7 @@
 #include "urban_gnss_localization/ros/conversions.hpp"
 #include "urban_gnss_localization/ros/event_log.hpp"
 #include "urban_gnss_localization/ros/input_watch.hpp"
+#include "urban_gnss_localization/ros/map_services.hpp"
 
 namespace urban_gnss {
 
@@ -51,8 +50,9 @@ struct LocalizerNodeParameters {
 /// localizer node makes its filter and hands it over. Further outputs are published in `on_output`.
 ///
 /// Subscribes odom, gps/fix, initialpose, gps/datum; gps/bias, gps/velocity and gps/satellites where the filter wants
-/// them; imu/data where use_imu_yaw_rate is set. Publishes odometry/filtered, tf map -> odom, ~status, and gps/datum
-/// (latched) where it found the datum itself. Services set_pose, datum, toLL, fromLL, ~reset.
+/// them; imu/data where use_imu_yaw_rate is set. Publishes odometry/filtered and gps/filtered, tf map -> odom, ~status,
+/// and gps/datum (latched) where it found the datum itself. Services set_pose, datum, toLL, fromLL, toLLArray,
+/// fromLLArray, ~reset.
 class LocalizerNode {
  public:
   using OutputHook = std::function<void(const LocalizationOutput&)>;
@@ -77,8 +77,12 @@ class LocalizerNode {
                 urban_gnss_localization::SetPose::Response& response);
   bool set_datum(urban_gnss_localization::SetDatum::Request& request,
                  urban_gnss_localization::SetDatum::Response& response);
-  bool to_ll(urban_gnss_localization::ToLL::Request& request, urban_gnss_localization::ToLL::Response& response);
-  bool from_ll(urban_gnss_localization::FromLL::Request& request, urban_gnss_localization::FromLL::Response& response);
+  /// toLL, fromLL, toLLArray, fromLLArray.
+  template <class Request, class Response>
+  bool convert(Request& request, Response& response) {
+    response = answer(request, pipeline_.frame());
+    return true;
+  }
   bool reset(std_srvs::Empty::Request& request, std_srvs::Empty::Response& response);
 
   std::string try_pose(const geometry_msgs::PoseWithCovarianceStamped& message);
@@ -100,6 +104,7 @@ class LocalizerNode {
   std::uint64_t outputs_{0};
 
   ros::Publisher estimate_publisher_;
+  ros::Publisher fix_publisher_;  ///< the estimate as a fix
   ros::Publisher status_publisher_;
   ros::Publisher datum_publisher_;
   std::vector<ros::Subscriber> subscribers_;

@@ -24,6 +24,7 @@ inline constexpr char kDatum[] = "gps/datum";
 inline constexpr char kImu[] = "imu/data";
 inline constexpr char kInitialPose[] = "initialpose";
 inline constexpr char kEstimate[] = "odometry/filtered";
+inline constexpr char kFilteredFix[] = "gps/filtered";
 inline constexpr char kParticles[] = "particle_cloud";
 inline constexpr char kWeightedParticles[] = "particle_cloud_weighted";
 inline constexpr char kStatus[] = "status";  ///< private: ~status

@@ -118,6 +118,7 @@ class Replay {
     for (const LocalizationOutput& output : pipeline_.take_outputs()) {
       estimate_.push_back({output.stamp, output.estimate.pose, output.estimate.covariance});
       write(topics::kEstimate, output.stamp, to_message(output, shell_.frames));
+      write(topics::kFilteredFix, output.stamp, to_fix_message(output, *pipeline_.frame(), shell_.frames));
       tf2_msgs::TFMessage tf;
       tf.transforms.push_back(to_map_to_odom(output, shell_.frames, shell_.transform_time_offset));
       write("tf", output.stamp, tf);
@@ -321,7 +322,7 @@ int replay_main(int argc, char** argv, const LocalizerRegistry& localizers) {
   app.add_option("--localizer", options.localizer, localizers.names() + ", or a name of --list-variants");
   app.add_option("--params", options.params, "YAML with the nodes' parameters; repeatable, later files win");
   line.add_set("--set", options.overrides, "a parameter of the localizer, or after gps_bias. of the bias filter");
-  app.add_option("--output", options.output, "bag to write: odometry/filtered, gps/bias, status, tf");
+  app.add_option("--output", options.output, "bag to write: odometry/filtered, gps/filtered, gps/bias, status, tf");
   app.add_option("--fix-topic", options.fix_topic, "sensor_msgs/NavSatFix");
   app.add_option("--odom-topic", options.odom_topic, "nav_msgs/Odometry");
   const auto* velocity_topic = app.add_option(
