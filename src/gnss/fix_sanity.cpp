@@ -103,12 +103,12 @@ struct Pattern {
 const Pattern& pattern_of(Mistake mistake) {
   static const Pattern kPatterns[kCovarianceMistakes] = {
       {has_three_decimals, 10, 4, evidence_of_sigma},
-      {is_hdop_squared, 10, 3, evidence_of_hdop},
+      {is_hdop_squared, 10, 2, evidence_of_hdop},
       {is_sbas_decimetre, 5},
       {is_square_degrees, 5},
       {is_zeros, 5},
       {is_no_variance, 5},
-      {is_huge, 30},
+      {is_huge, 15},
       {is_type_forgotten, 5},
       {is_declared, 100},
   };

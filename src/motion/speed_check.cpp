@@ -44,16 +44,6 @@ double least_time_s(SpeedFault fault, double ratio, bool odometry_jumped) {
 
 }  // namespace
 
-const char* to_string(SpeedFault fault) {
-  switch (fault) {
-    case SpeedFault::kNone: return "agrees";
-    case SpeedFault::kReversed: return "reversed";
-    case SpeedFault::kDead: return "dead";
-    case SpeedFault::kScaled: return "scaled";
-  }
-  return "?";
-}
-
 std::optional<SpeedFault> SpeedCheck::pattern_of(const SpeedPair& pair) const {
   const double odometry = std::abs(pair.odometry_mps);
   const double receiver = std::abs(pair.receiver_mps);

@@ -72,7 +72,14 @@ void LocalizationPipeline::reset(const std::string& why) {
 }
 
 bool LocalizationPipeline::is_new(InputStream stream, Stamp stamp) {
-  return clocks_.accept(stream, stamp, [this](const std::string& why) { reset(why); });
+  const bool is_new = clocks_.accept(stream, stamp, [this](const std::string& why) { reset(why); });
+  if (!is_new) note_unset_stamp(stream, stamp);
+  return is_new;
+}
+
+void LocalizationPipeline::note_unset_stamp(InputStream stream, Stamp stamp) {
+  if (stamp != Stamp::zero() || !unset_stamps_.insert(stream).second) return;
+  event(Level::kWarn, std::string("header.stamp of ") + to_string(stream) + " is 0: its driver must set it");
 }
 
 bool LocalizationPipeline::is_far_ahead(Stamp stamp) const {
@@ -222,6 +229,7 @@ void LocalizationPipeline::add_fix(const RawFix& fix) {
   const auto rejected = fixes_.add(fix);
   for (PipelineEvent& mistake : fixes_.take_events()) events_.push_back(std::move(mistake));
   if (rejected) {
+    if (rejected->decision == FixDecision::kRejectedStale) note_unset_stamp(InputStream::kFixes, fix.stamp);
     decide(*rejected);
   } else if (!frame()) {
     reporter_.note_waiting_fix(fix.stamp);

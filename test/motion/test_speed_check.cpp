@@ -136,12 +136,5 @@ TEST(SpeedCheck, SilenceOfTheReceiverStartsAnew) {
   EXPECT_EQ(pairs.add_for(0.2, 0.0, 3.0), SpeedFault::kDead);
 }
 
-TEST(SpeedCheck, FaultsHaveNamesOfTheirOwn) {
-  EXPECT_STREQ(to_string(SpeedFault::kNone), "agrees");
-  EXPECT_STREQ(to_string(SpeedFault::kReversed), "reversed");
-  EXPECT_STREQ(to_string(SpeedFault::kDead), "dead");
-  EXPECT_STREQ(to_string(SpeedFault::kScaled), "scaled");
-}
-
 }  // namespace
 }  // namespace urban_gnss

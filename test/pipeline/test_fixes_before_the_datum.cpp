@@ -53,6 +53,18 @@ TEST(FixesBeforeTheDatum, OtherReasonsToo) {
   EXPECT_TRUE(at_sea.says("both 0")) << at_sea.pipeline.waiting_for();
 }
 
+TEST(FixesBeforeTheDatum, AStreamWhoseStampsAreNotSetIsNamedOnce) {
+  Rig rig("{}");
+  for (int k = 0; k < 5; ++k) {
+    OdometrySample sample = Rig::odometry(0.1 * k);
+    sample.stamp = Stamp::zero();
+    rig.pipeline.add_odometry(sample);
+  }
+  const std::vector<PipelineEvent> events = rig.pipeline.take_events();
+  ASSERT_EQ(events.size(), 1u);
+  EXPECT_NE(events.front().text.find("header.stamp of odometry is 0"), std::string::npos) << events.front().text;
+}
+
 TEST(FixesBeforeTheDatum, AGoodOneWaitsForItAndIsDecidedOnce) {
   Waiting rig;
   EXPECT_TRUE(rig.fixes(4, [](RawFix&) {}).empty());

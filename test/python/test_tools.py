@@ -206,7 +206,12 @@ class ToolTest(unittest.TestCase):
         self.assertLess(result["errors"]["position_m"]["median"], 10.0)  # dead reckoning from a start by fixes
         with rosbag.Bag(self.path("out.bag")) as bag:
             covariances = {message.pose.covariance[0] for _, message, _ in bag.read_messages("/odometry/filtered")}
+            fixes = [message for _, message, _ in bag.read_messages("/gps/filtered")]
         self.assertEqual(covariances, {25.0})
+        self.assertEqual(len(fixes), result["estimates"])
+        self.assertEqual({fix.position_covariance[0] for fix in fixes}, {25.0})
+        self.assertEqual({fix.altitude for fix in fixes}, {result["datum"][2]})
+        self.assertLess(max(abs(fix.latitude - result["datum"][0]) for fix in fixes), 0.1)
         self.assertIn("start_sigma = -1", self.refuse(dummy, self.path("in.bag"), "--localizer", "dummy", "--set",
                                                       "start_sigma=-1"))
         self.assertIn("no such localizer", self.refuse("replay", self.path("in.bag"), "--localizer", "dummy"))

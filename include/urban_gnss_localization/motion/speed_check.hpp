@@ -13,7 +13,6 @@ enum class SpeedFault {
   kDead,      ///< the wheels stand, and the robot moves
   kScaled,    ///< by a factor that stays: other units, one of two wheels dead
 };
-const char* to_string(SpeedFault fault);
 
 /// Forward speed at one time, by the odometry and by the receiver's velocity.
 struct SpeedPair {

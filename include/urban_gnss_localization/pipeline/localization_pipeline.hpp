@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -105,6 +106,8 @@ class LocalizationPipeline {
  private:
   /// Whether the stamp is newer than the stream's last, or the stream's clock was set back, which resets everything.
   bool is_new(InputStream stream, Stamp stamp);
+  /// A message was left out for its stamp: says once of each stream where that was never set.
+  void note_unset_stamp(InputStream stream, Stamp stamp);
   /// Whether the stamp is farther ahead of the odometry than any delay explains.
   bool is_far_ahead(Stamp stamp) const;
   void forget_odometry(double gap_s);
@@ -142,6 +145,7 @@ class LocalizationPipeline {
   std::unique_ptr<Localizer> localizer_;
   Eigen::Vector2d antenna_;  ///< m, in the base frame
   InputClocks clocks_;
+  std::set<InputStream> unset_stamps_;  ///< that were said
   MapDatum datum_;
   OdometryHistory history_;
   std::size_t epoch_{0};
