@@ -196,7 +196,7 @@ const char* to_string(CovarianceMistake mistake) {
 SaneFix FixSanity::add(const RawFix& raw) {
   SaneFix sane{raw, {}};
   if (!is_usable_position(raw)) {
-    if (raw.has_fix) note_misplaced(hint_of_no_place(raw.position));
+    if (raw.has_fix) note(no_place_, hint_of_no_place(raw.position));
     return sane;
   }
   observe(raw);
@@ -232,14 +232,14 @@ void FixSanity::observe(const RawFix& raw) {
     if (pattern.evidence == nullptr || evidence.variances.size() >= pattern.variances) continue;
     if (const auto variance = pattern.evidence(raw)) evidence.variances.insert(*variance);
   }
-  note_misplaced(looks_like_radians(raw.position) ? kInRadians : "");
+  note(no_place_, looks_like_radians(raw.position) ? kInRadians : "");
   last_ = raw;
 }
 
-void FixSanity::note_misplaced(const std::string& hint) {
-  misplaced_ = hint.empty() ? 0 : misplaced_ + 1;
-  if (misplaced_ < kMisplacedFixes) return;
-  if (!std::exchange(misplaced_was_said_, true)) news_.push_back({true, "gps/fix is in the wrong place: " + hint});
+void FixSanity::note(Misplaced& misplaced, const std::string& hint) {
+  misplaced.fixes = hint.empty() ? 0 : misplaced.fixes + 1;
+  if (misplaced.fixes < kMisplacedFixes || std::exchange(misplaced.was_said, true)) return;
+  news_.push_back({true, "gps/fix is in the wrong place: " + hint});
 }
 
 bool FixSanity::is_shown(CovarianceMistake mistake) const {

@@ -38,9 +38,14 @@ struct Rejection {
 };
 
 std::optional<Rejection> reject_position(const RawFix& raw) {
-  if (!raw.has_fix) return Rejection{FixDecision::kRejectedStatus, "the receiver has no fix"};
   const auto& [latitude, longitude, altitude] = raw.position;
   (void)altitude;
+  if (!raw.has_fix) {
+    const bool has_place = is_latitude(latitude) && is_longitude(longitude) && (latitude != 0.0 || longitude != 0.0);
+    return Rejection{FixDecision::kRejectedStatus,
+                     has_place ? "the receiver has no fix (its status is negative), though it gives a place"
+                               : "the receiver has no fix"};
+  }
   if (!std::isfinite(latitude) || !std::isfinite(longitude)) {
     return Rejection{FixDecision::kRejectedNonFinite, place_text(latitude, longitude) + " is not finite"};
   }

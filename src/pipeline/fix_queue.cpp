@@ -20,10 +20,11 @@ std::vector<FixOutcome> FixQueue::validate(const LocalFrame& frame) {
     ValidatedFix fix = validate_fix(raw.fix, frame, last_stamp_, parameters_);
     FixOutcome& outcome = fix.outcome;
     if (is_rejected(outcome.decision)) {
-      sanity_.note_misplaced(hint_of_far_place(raw.fix.position, frame, parameters_.max_distance_from_datum));
+      sanity_.note_far(hint_of_far_place(raw.fix.position, frame, parameters_.max_distance_from_datum));
       rejected.push_back(std::move(outcome));
       continue;
     }
+    sanity_.note_far({});
     if (!raw.reason.empty()) {
       if (outcome.decision == FixDecision::kAccepted) outcome.decision = FixDecision::kInflated;
       outcome.covariance_clamped = true;

@@ -82,7 +82,9 @@ TEST(FixQueue, AMistakeOfTheDriverIsSaidOnceAndItsCovarianceReplaced) {
     queue.validate(kFrame);
     for (PipelineEvent& event : queue.take_events()) events.push_back(std::move(event));
     const ValidatedFix validated = queue.pop();
-    if (k > 10) EXPECT_NEAR(validated.fix.covariance(0, 0), 16.0 * hdop * hdop, 1e-9);
+    if (k > 10) {
+      EXPECT_NEAR(validated.fix.covariance(0, 0), 16.0 * hdop * hdop, 1e-9);
+    }
     last = validated.outcome;
   }
   ASSERT_EQ(events.size(), 1u) << "also across a reset";

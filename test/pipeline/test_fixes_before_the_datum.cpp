@@ -81,7 +81,10 @@ TEST(FixesBeforeTheDatum, AStampThatIsNotSetResetsNothing) {
   Waiting rig;
   rig.fixes(8, [](RawFix&) {});
   rig.pipeline.take_events();
-  rig.fixes(1, [](RawFix& raw) { raw.stamp = Stamp::zero(); });
+  RawFix unset = raw_fix(Stamp::zero(), Rig::truth(8.5).position());
+  rig.pipeline.add_fix(unset);
+  rig.drive(9.0);
+  ASSERT_EQ(rig.pipeline.take_outcomes().back().decision, FixDecision::kRejectedStale);
   for (const PipelineEvent& event : rig.pipeline.take_events()) {
     EXPECT_EQ(event.text.find("reset"), std::string::npos) << event.text;
   }

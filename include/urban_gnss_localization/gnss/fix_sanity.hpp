@@ -78,9 +78,9 @@ class FixSanity {
   /// What was found since the last call.
   std::vector<News> take_news();
 
-  /// A fix was rejected for its place, which a known mistake explains (position_hint.hpp): said once it is no accident.
-  /// An empty hint: it was not.
-  void note_misplaced(const std::string& hint);
+  /// What explains that the fix was rejected for its distance from the datum (hint_of_far_place()); empty where nothing
+  /// does, or where it was not. Said where it is no accident.
+  void note_far(const std::string& hint) { note(far_, hint); }
 
   /// What is wrong with the covariance of the last fixes, e.g. for a status; empty where nothing is.
   std::string complaint() const;
@@ -92,14 +92,20 @@ class FixSanity {
     std::set<double> variances;  ///< different ones among them, as many as are needed
     bool was_said{false};
   };
+  /// Fixes in a wrong place that a known mistake explains.
+  struct Misplaced {
+    std::size_t fixes{0};  ///< in a row
+    bool was_said{false};
+  };
+  void note(Misplaced& misplaced, const std::string& hint);
   bool is_shown(CovarianceMistake mistake) const;
   void observe(const RawFix& raw);
   std::optional<CovarianceMistake> current() const;
 
   FixValidationParameters parameters_;
   std::array<Evidence, kCovarianceMistakes> evidence_;
-  std::size_t misplaced_{0};  ///< in a row
-  bool misplaced_was_said_{false};
+  Misplaced no_place_;
+  Misplaced far_;
   std::optional<RawFix> last_;
   std::vector<News> news_;
 };
