@@ -1,0 +1,38 @@
+#pragma once
+
+#include <rosbag/bag.h>
+
+#include <functional>
+#include <vector>
+
+#include "replay_run.hpp"
+#include "replay_settings.hpp"
+#include "urban_gnss_localization/common/stamp.hpp"
+
+namespace urban_gnss {
+
+/// One message, or what else a run takes.
+struct ReplayInput {
+  Stamp time{0};  ///< when it was recorded
+  std::function<void(ReplayRun&)> give_to;
+};
+
+/// All that a run takes, in the order in which it takes it. Keeps its bag open.
+class ReplayInputs {
+ public:
+  /// Throws std::runtime_error where a file cannot be read, or where a topic that is needed has no message; it then
+  /// lists what the bag has.
+  explicit ReplayInputs(const ReplayOptions& options);
+
+  const std::vector<ReplayInput>& all() const { return inputs_; }
+  /// From the first input to the last, s.
+  double duration_s() const;
+
+ private:
+  void read_bag(const ReplayOptions& options);
+
+  rosbag::Bag bag_;
+  std::vector<ReplayInput> inputs_;
+};
+
+}  // namespace urban_gnss
