@@ -38,6 +38,23 @@ std::size_t fixes_in(const ReceiverOutput& output) {
 
 }  // namespace
 
+ReceiverRecording to_recording(const NmeaLog& log, const std::string& source) {
+  ReceiverRecording recording{source, {}};
+  const ReceiverOutput& output = log.output;
+  auto velocity = output.velocities.begin();
+  auto epoch = output.satellites.begin();
+  for (const RawFix& fix : output.fixes) {
+    TimedOutput& timed = recording.outputs.emplace_back();
+    timed.time = fix.stamp;
+    timed.output.fixes.push_back(fix);
+    if (velocity != output.velocities.end() && velocity->stamp == fix.stamp) {
+      timed.output.velocities.push_back(*velocity++);
+    }
+    if (epoch != output.satellites.end() && epoch->stamp == fix.stamp) timed.output.satellites.push_back(*epoch++);
+  }
+  return recording;
+}
+
 std::string summary_of(const NmeaLog& log) {
   std::ostringstream text;
   text << log.counts.solutions << " solutions (" << fixes_in(log.output) << " fixes, " << log.output.velocities.size()

@@ -3,6 +3,7 @@
 #include <optional>
 #include <string>
 
+#include "receiver_recording.hpp"
 #include "urban_gnss_localization/receivers/nmea_decoder.hpp"
 
 namespace urban_gnss {
@@ -12,6 +13,9 @@ struct NmeaLog {
   ReceiverOutput output;  ///< stamps are UTC
   NmeaCounts counts;
 };
+
+/// The log solution by solution, each at its stamp.
+ReceiverRecording to_recording(const NmeaLog& log, const std::string& source);
 
 /// "29 solutions (29 fixes, 29 velocities, 29 lists of satellites) of 928 sentences; 3 lines refused: …".
 std::string summary_of(const NmeaLog& log);
@@ -24,8 +28,8 @@ Day parse_date(const std::string& text);
 /// warning says so. Throws std::runtime_error where the file cannot be read, or has no sentence.
 NmeaLog read_nmea_log(const std::string& file, std::optional<Day> first_day, const NmeaParameters& parameters = {});
 
-/// The same as it comes live, when each line has an arrival stamp: its number in the file, in nanoseconds. For comparing
-/// line by line.
+/// The same as it comes live, when each line has an arrival stamp: its number in the file, in nanoseconds. For
+/// comparing line by line.
 NmeaLog read_nmea_log_by_lines(const std::string& file, const NmeaParameters& parameters = {});
 
 }  // namespace urban_gnss
