@@ -1,6 +1,7 @@
 #include "urban_gnss_localization/receivers/message_view.hpp"
 
 #include <cstring>
+#include <utility>
 
 namespace urban_gnss {
 namespace {
@@ -125,6 +126,11 @@ std::optional<MessageView::Found> MessageView::find(std::string_view path) const
     type = &definition_->at(found->type);
     path.remove_prefix(dot + 1);
   }
+}
+
+bool MessageView::has_text(std::string_view path) const {
+  const auto found = find(path);
+  return found && found->field->length == MessageDefinition::kNoArray && is_text(found->field->kind);
 }
 
 MessageView::Found MessageView::require(std::string_view path) const {

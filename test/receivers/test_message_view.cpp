@@ -133,9 +133,7 @@ TEST(MessageView, LengthsAreNotTrusted) {
 }
 
 TEST(MessageDefinition, MalformedTextsAreRefused) {
-  const auto error = [](const std::string& text) {
-    return error_of([&] { MessageDefinition("a/B", "md5", text); });
-  };
+  const auto error = [](const std::string& text) { return error_of([&] { MessageDefinition("a/B", "md5", text); }); };
   const std::string next = "\n=====\n";
   EXPECT_EQ(error(""), "no error");
   EXPECT_THAT(error("uint8"), HasSubstr("without a name"));

@@ -21,6 +21,7 @@ class MessageView {
   MessageView(const MessageDefinition& definition, const std::uint8_t* data, std::size_t size);
 
   bool has(std::string_view path) const { return find(path).has_value(); }
+  bool has_text(std::string_view path) const;
   /// A number of any type, or a bool.
   double number(std::string_view path) const;
   /// Requires that the field is no floating-point number.
