@@ -116,7 +116,8 @@ std::vector<OdometrySample> odometry_of_velocities(const std::vector<RawVelocity
 std::vector<RawVelocity> velocities_of_fixes(const std::vector<RawFix>& fixes) {
   std::vector<RawFix> usable;
   for (const RawFix& fix : fixes) {
-    if (fix.has_fix && (usable.empty() || fix.stamp > usable.back().stamp)) usable.push_back(fix);
+    if (!fix.has_fix || !position_faults(fix.position).empty()) continue;
+    if (usable.empty() || fix.stamp > usable.back().stamp) usable.push_back(fix);
   }
   std::vector<RawVelocity> velocities;
   if (usable.empty()) return velocities;

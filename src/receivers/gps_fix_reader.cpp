@@ -5,6 +5,7 @@
 
 #include "urban_gnss_localization/common/positive_definite.hpp"
 #include "urban_gnss_localization/geometry/angles.hpp"
+#include "urban_gnss_localization/receivers/ground_velocity.hpp"
 #include "urban_gnss_localization/receivers/message_parts.hpp"
 
 namespace urban_gnss {
@@ -12,7 +13,6 @@ namespace {
 
 constexpr double kRadius95 = 2.4477;  ///< standard deviations per axis, of the circle that holds 95 %
 constexpr double kTwoSided95 = 1.96;
-constexpr double kStandingSpeed_mps = 0.5;
 
 /// The number, where there is one that is positive; else 0.
 double positive_or_zero(const MessageView& message, const char* field) {
@@ -62,25 +62,21 @@ std::optional<RawVelocity> gps_fix_velocity_of(const MessageView& message, Stamp
   const double speed_mps = message.number("speed");
   const double track_deg = message.number("track");
   const double speed_sigma_mps = positive_or_zero(message, "err_speed") / kTwoSided95;
-  if (!std::isfinite(speed_mps) || speed_mps < 0.0) return std::nullopt;
   if (speed_mps == 0.0 && track_deg == 0.0 && speed_sigma_mps == 0.0) return std::nullopt;
-  RawVelocity velocity;
-  velocity.stamp = stamp;
-  if (!(std::abs(track_deg) <= 360.0)) {
-    if (speed_mps > kStandingSpeed_mps) return std::nullopt;
-    const double sigma_mps = std::hypot(speed_sigma_mps, speed_mps);
-    velocity.covariance = Eigen::Matrix2d::Identity() * sigma_mps * sigma_mps;
+  const bool has_track = std::abs(track_deg) <= 360.0;
+  const double track = has_track ? degrees_to_radians(track_deg) : SatelliteObservation::kUnknown;
+  auto velocity = ground_velocity(stamp, speed_mps, track);
+  if (!velocity || speed_sigma_mps == 0.0) return velocity;
+  if (!has_track) {
+    velocity->covariance += speed_sigma_mps * speed_sigma_mps * Eigen::Matrix2d::Identity();
     return velocity;
   }
-  const double track = degrees_to_radians(track_deg);
   const Eigen::Vector2d along(std::sin(track), std::cos(track));
   const Eigen::Vector2d across(along.y(), -along.x());
   const double track_sigma = degrees_to_radians(positive_or_zero(message, "err_track")) / kTwoSided95;
   const double across_sigma_mps = std::max(speed_sigma_mps, speed_mps * std::min(track_sigma, 1.0));
-  velocity.velocity = speed_mps * along;
-  velocity.covariance = speed_sigma_mps * speed_sigma_mps * along * along.transpose();
-  velocity.covariance += across_sigma_mps * across_sigma_mps * across * across.transpose();
-  if (speed_sigma_mps == 0.0) velocity.covariance.setZero();  // not declared
+  velocity->covariance = speed_sigma_mps * speed_sigma_mps * along * along.transpose() +
+                         across_sigma_mps * across_sigma_mps * across * across.transpose();
   return velocity;
 }
 

@@ -7,6 +7,7 @@
 #include "urban_gnss_localization/receivers/mavros_decoder.hpp"
 #include "urban_gnss_localization/receivers/novatel_decoder.hpp"
 #include "urban_gnss_localization/receivers/satellite_numbers.hpp"
+#include "urban_gnss_localization/receivers/sentence_decoder.hpp"
 #include "urban_gnss_localization/receivers/ublox_decoder.hpp"
 
 namespace urban_gnss {
@@ -48,6 +49,12 @@ const std::vector<ReceiverPreset>& receiver_presets() {
        {{"extended_fix", kGpsFixTypes, Role::kGpsFix, "fix with covariance, velocity, satellites"},
         {"status", "gps_common/GPSStatus, gps_msgs/GPSStatus", Role::kGpsStatus, "satellites, where the fix has none"}},
        make_gpsd},
+      {"nmea",
+       "nmea_navsat_driver and others",
+       "",
+       {{"nmea_sentence", "nmea_msgs/Sentence", Role::kSentence,
+         "fix, velocity, satellites, residuals, as sentences have them"}},
+       make<SentenceDecoder>},
       {"septentrio",
        "septentrio_gnss_driver",
        "septentrio_gnss",

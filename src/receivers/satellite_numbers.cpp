@@ -1,5 +1,7 @@
 #include "urban_gnss_localization/receivers/satellite_numbers.hpp"
 
+#include "urban_gnss_localization/receivers/nmea_satellite_id.hpp"
+
 namespace urban_gnss {
 namespace {
 
@@ -9,13 +11,6 @@ struct Range {
   int first_svid;
 };
 
-constexpr Range kGpsd[] = {
-    {Constellation::kGps, 1, 32, 1},       {Constellation::kSbas, 33, 64, 120},
-    {Constellation::kGlonass, 65, 99, 1},  {Constellation::kSbas, 120, 158, 120},
-    {Constellation::kImes, 173, 182, 1},   {Constellation::kQzss, 193, 200, 1},
-    {Constellation::kBeidou, 201, 263, 1}, {Constellation::kGalileo, 301, 336, 1},
-    {Constellation::kBeidou, 401, 463, 1}, {Constellation::kNavic, 500, 514, 1},
-};
 constexpr Range kUbloxSvinfo[] = {
     {Constellation::kGps, 1, 32, 1},       {Constellation::kBeidou, 33, 64, 6},    {Constellation::kGlonass, 65, 96, 1},
     {Constellation::kSbas, 120, 158, 120}, {Constellation::kBeidou, 159, 163, 1},  {Constellation::kImes, 173, 182, 1},
@@ -56,7 +51,7 @@ std::optional<SatelliteId> in_any(const Range (&ranges)[N], int number) {
 
 }  // namespace
 
-std::optional<SatelliteId> satellite_of_gpsd(int number) { return in_any(kGpsd, number); }
+std::optional<SatelliteId> satellite_of_gpsd(int number) { return nmea_satellite_id(Constellation::kUnknown, number); }
 
 std::optional<SatelliteId> satellite_of_ublox_svinfo(int number) { return in_any(kUbloxSvinfo, number); }
 

@@ -14,9 +14,8 @@ namespace urban_gnss {
 /// bounds of 95 %: per axis 1/2.448 of the radius of a circle, 1/1.96 up.
 RawFix gps_fix_of(const MessageView& message, Stamp stamp);
 
-/// Speed and track (degrees from north) as velocity, err_speed and err_track (95 %) as its covariance. Nothing where
-/// the driver left them out: all 0, not finite, or a track that is none. Where only the track is unknown, as receivers
-/// have it at a standstill, and the speed is small, the velocity is 0 with the speed added to its covariance.
+/// Speed and track (degrees from north) as velocity (ground_velocity()), err_speed and err_track (95 %) as its
+/// covariance. Nothing where the driver left them out: all 0, not finite, or at speed with a track that is none.
 std::optional<RawVelocity> gps_fix_velocity_of(const MessageView& message, Stamp stamp);
 
 /// The satellites that the driver lists as visible, by its way of numbering; empty where it lists none. `prefix` is

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <optional>
 
 #include "urban_gnss_localization/gnss/satellite.hpp"
@@ -7,7 +8,7 @@
 /// How drivers number satellites. Nothing for a number that no satellite has.
 namespace urban_gnss {
 
-/// gpsd, and NMEA 0183 with the ranges that receivers added: 33 is SBAS 120, 65 GLONASS 1, 301 Galileo 1, 401 BeiDou 1.
+/// gpsd: the ranges that systems share in NMEA 0183 (nmea_satellite_id()).
 std::optional<SatelliteId> satellite_of_gpsd(int number);
 
 /// u-blox up to protocol 13 (NAV-SVINFO): 65 is GLONASS 1, 211 Galileo 1, 159 BeiDou 1, 33 BeiDou 6.

@@ -1,10 +1,12 @@
 #pragma once
 
+#include <cstddef>
 #include <string>
 #include <vector>
 
 #include "urban_gnss_localization/common/stamp.hpp"
-#include "urban_gnss_localization/receivers/receiver_output.hpp"
+#include "urban_gnss_localization/motion/odometry_history.hpp"
+#include "urban_gnss_localization/receivers/receiver_input.hpp"
 
 namespace urban_gnss {
 
@@ -19,6 +21,16 @@ struct TimedOutput {
 struct ReceiverRecording {
   std::string source;  ///< for people: what was read
   std::vector<TimedOutput> outputs;
+  ReceiverCounts counts;
+  std::size_t unreadable{0};  ///< messages that were left out
 };
+
+/// Odometry for a run without wheels (`--odom none`), of the receiver's velocities, or of its fixes where it has none.
+/// Each sample comes at the time of the first output with a stamp that is not older.
+struct TimedOdometry {
+  Stamp time{0};
+  OdometrySample sample;
+};
+std::vector<TimedOdometry> odometry_of(const ReceiverRecording& recording);
 
 }  // namespace urban_gnss

@@ -22,6 +22,26 @@ namespace {
 
 namespace fs = std::filesystem;
 
+nlohmann::json to_json(const ReceiverRecording& receiver) {
+  const ReceiverCounts& counts = receiver.counts;
+  return {{"source", receiver.source},
+          {"fixes", counts.fixes},
+          {"solutions_without_fix", counts.no_fixes},
+          {"velocities", counts.velocities},
+          {"satellite_lists", counts.epochs},
+          {"fixes_with_satellites", counts.fixes_with_satellites},
+          {"fixes_with_residuals", counts.fixes_with_residuals},
+          {"unreadable_messages", receiver.unreadable}};
+}
+
+void print_receiver(const ReceiverRecording& receiver) {
+  const ReceiverCounts& counts = receiver.counts;
+  std::cout << "receiver " << receiver.source << '\n'
+            << "  " << counts.fixes << " fixes (" << counts.fixes_with_satellites << " with satellites, "
+            << counts.fixes_with_residuals << " with residuals), " << counts.velocities << " velocities, "
+            << counts.no_fixes << " solutions without a fix, " << receiver.unreadable << " unreadable messages\n";
+}
+
 void print_summary(const ReplayRun& replay, const nlohmann::json& metrics, double wall_s, double bag_s) {
   std::cout << replay.estimate().size() << " estimates in " << std::fixed << std::setprecision(2) << wall_s << " s ("
             << std::setprecision(0) << bag_s / std::max(wall_s, 1e-3) << " times real time)\n";
@@ -82,9 +102,17 @@ void run(const ReplayOptions& options, const LocalizerRegistry& localizers) {
   replay.close();
   const double wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 
-  const nlohmann::json metrics = metrics_of(options, settings, replay);
+  nlohmann::json metrics = metrics_of(options, settings, replay);
+  if (options.without_odometry) metrics["odometry"] = "constant-velocity model";
+  if (inputs.receiver()) metrics["receiver"] = to_json(*inputs.receiver());
   write_results(options, metrics, replay);
   print_summary(replay, metrics, wall_s, inputs.duration_s());
+  if (inputs.receiver()) print_receiver(*inputs.receiver());
+  if (options.without_odometry) {
+    std::cout << "no odometry: constant-velocity model, of the receiver's "
+              << (inputs.receiver()->counts.velocities > 0 ? "velocities" : "fixes")
+              << "; the yaw is the course over ground\n";
+  }
   if (replay.estimate().empty()) {
     throw std::runtime_error("no estimate: still waiting for " + replay.pipeline().waiting_for());
   }
@@ -103,6 +131,7 @@ int replay_main(int argc, char** argv, const LocalizerRegistry& localizers) {
   CLI::App& app = line.app();
   auto* input = app.add_option("bag", options.input, "the bag to read");
   bool only_names = false;
+  std::string odometry = "topic";
   app.add_flag("--list-variants", only_names, "print the names under which localizers are compared, and end");
   app.add_option("--localizer", options.localizer, localizers.names() + ", or a name of --list-variants");
   app.add_option("--params", options.params, "YAML with the nodes' parameters; repeatable, later files win");
@@ -119,6 +148,13 @@ int replay_main(int argc, char** argv, const LocalizerRegistry& localizers) {
   const auto* satellites_topic = app.add_option("--satellites-topic", options.satellites_topic,
                                                 "urban_gnss_localization/SatelliteArray, whose residuals tell the "
                                                 "ranges of a fix, where the bag has it; \"\": none");
+  app.add_option("--receiver", options.receiver,
+                 "whose messages tell fix, velocity and satellites: " + receiver_preset_names() +
+                     "; navsatfix: --fix-topic and the other two");
+  app.add_option("--receiver-ns", options.receiver_ns, "namespace of the receiver's topics; default: found in the bag");
+  app.add_option("--odom", odometry,
+                 "topic: of --odom-topic; none: a constant-velocity model, of what the receiver says of its motion")
+      ->check(CLI::IsMember({"topic", "none"}));
   app.add_option("--truth-topic", options.truth_topic, "nav_msgs/Odometry, for the errors only");
   app.add_option("--datum", options.datum,
                  "LAT,LON,ALT (deg, deg, m); default: the bag's gps/datum, or the first fixes")
@@ -133,6 +169,7 @@ int replay_main(int argc, char** argv, const LocalizerRegistry& localizers) {
     options.wants_velocity = velocity_topic->count() > 0 && !options.velocity_topic.empty();
     options.wants_satellites = satellites_topic->count() > 0 && !options.satellites_topic.empty();
     options.wants_imu = imu_topic->count() > 0 && !options.imu_topic.empty();
+    options.without_odometry = odometry == "none";
     run(options, localizers);
   });
 }

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "bag_messages.hpp"
+#include "bag_receiver.hpp"
 #include "urban_gnss_localization/ros/conversions.hpp"
 #include "urban_gnss_localization/ros/receiver_messages.hpp"
 #include "urban_gnss_localization/ros/topics.hpp"
@@ -33,19 +34,19 @@ struct Topics {
 };
 
 /// Throws std::runtime_error, which lists what the bag has, where a topic that is needed has no message.
-void require_topics(const rosbag::Bag& bag, const Messages& messages, const ReplayOptions& options,
-                    const Topics& names) {
+void require_topics(const rosbag::Bag& bag, const Messages& messages, const ReplayOptions& options, const Topics& names,
+                    bool has_receiver) {
   const auto require = [&](bool is_needed, const std::string& option, const std::string& name) {
     const auto is_of_it = [&](const auto& message) { return without_leading_slash(message.getTopic()) == name; };
     if (!is_needed || std::any_of(messages.begin(), messages.end(), is_of_it)) return;
     throw std::runtime_error(options.input + " has no message on " + name + " (" + option + "); it has" +
                              topics_of(bag));
   };
-  require(true, "--fix-topic", names.fix);
-  require(true, "--odom-topic", names.odom);
-  require(options.wants_imu, "--imu-topic", names.imu);
-  require(options.wants_velocity, "--velocity-topic", names.velocity);
-  require(options.wants_satellites, "--satellites-topic", names.satellites);
+  require(!has_receiver, "--fix-topic", names.fix);
+  require(!options.without_odometry, "--odom-topic", names.odom);
+  require(options.wants_imu && !options.without_odometry, "--imu-topic", names.imu);
+  require(options.wants_velocity && !has_receiver, "--velocity-topic", names.velocity);
+  require(options.wants_satellites && !has_receiver, "--satellites-topic", names.satellites);
 }
 
 void give(const rosbag::MessageInstance& message, const Topics& names, ReplayRun& run) {
@@ -71,16 +72,51 @@ void give(const rosbag::MessageInstance& message, const Topics& names, ReplayRun
 
 }  // namespace
 
-ReplayInputs::ReplayInputs(const ReplayOptions& options) { read_bag(options); }
-
-void ReplayInputs::read_bag(const ReplayOptions& options) {
+ReplayInputs::ReplayInputs(const ReplayOptions& options) {
   if (!std::filesystem::exists(options.input)) throw std::runtime_error(options.input + ": no such bag");
   bag_.open(options.input, rosbag::bagmode::Read);
+  read_receiver(options);
+  read_topics(options);
+  if (options.without_odometry) read_odometry_of_receiver();
+  if (receiver_) {
+    for (const TimedOutput& each : receiver_->outputs) {
+      inputs_.push_back({each.time, [&output = each.output](ReplayRun& run) { run.add_receiver(output); }});
+    }
+  }
+  std::stable_sort(inputs_.begin(), inputs_.end(),
+                   [](const ReplayInput& a, const ReplayInput& b) { return a.time < b.time; });
+}
+
+void ReplayInputs::read_receiver(const ReplayOptions& options) {
+  if (find_receiver_preset(options.receiver).make != nullptr) {
+    receiver_ = decode_receiver(bag_, options);
+  } else if (options.without_odometry) {
+    receiver_ = read_receiver_topics(bag_, options);
+  }
+}
+
+void ReplayInputs::read_topics(const ReplayOptions& options) {
   const Topics names(options);
-  const Messages messages = ordered_messages(bag_, names.ordered());
-  require_topics(bag_, messages, options, names);
+  std::vector<std::string> wanted = names.ordered();
+  const auto leave_out = [&](const std::string& name) {
+    wanted.erase(std::remove(wanted.begin(), wanted.end(), name), wanted.end());
+  };
+  if (receiver_) {
+    for (const std::string& name : {names.fix, names.velocity, names.satellites}) leave_out(name);
+  }
+  if (options.without_odometry) {
+    for (const std::string& name : {names.odom, names.imu}) leave_out(name);
+  }
+  const Messages messages = ordered_messages(bag_, wanted);
+  require_topics(bag_, messages, options, names, receiver_.has_value());
   for (const rosbag::MessageInstance& message : messages) {
     inputs_.push_back({to_stamp(message.getTime()), [message, names](ReplayRun& run) { give(message, names, run); }});
+  }
+}
+
+void ReplayInputs::read_odometry_of_receiver() {
+  for (const TimedOdometry& each : odometry_of(*receiver_)) {
+    inputs_.push_back({each.time, [sample = each.sample](ReplayRun& run) { run.add_odometry(sample); }});
   }
 }
 

@@ -3,8 +3,10 @@
 #include <rosbag/bag.h>
 
 #include <functional>
+#include <optional>
 #include <vector>
 
+#include "receiver_recording.hpp"
 #include "replay_run.hpp"
 #include "replay_settings.hpp"
 #include "urban_gnss_localization/common/stamp.hpp"
@@ -27,11 +29,16 @@ class ReplayInputs {
   const std::vector<ReplayInput>& all() const { return inputs_; }
   /// From the first input to the last, s.
   double duration_s() const;
+  /// What a receiver said, where it takes the place of topics.
+  const std::optional<ReceiverRecording>& receiver() const { return receiver_; }
 
  private:
-  void read_bag(const ReplayOptions& options);
+  void read_receiver(const ReplayOptions& options);
+  void read_topics(const ReplayOptions& options);
+  void read_odometry_of_receiver();
 
   rosbag::Bag bag_;
+  std::optional<ReceiverRecording> receiver_;
   std::vector<ReplayInput> inputs_;
 };
 

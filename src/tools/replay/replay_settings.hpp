@@ -26,6 +26,9 @@ struct ReplayOptions {
   std::string satellites_topic = topics::kSatellites;
   bool wants_satellites = false;  ///< satellites_topic was asked for
   std::string truth_topic = topics::kTruth;
+  std::string receiver = "navsatfix";  ///< a name of receiver_presets()
+  std::string receiver_ns;             ///< empty: to be found
+  bool without_odometry = false;       ///< --odom none
   std::vector<double> datum;
   int seed = -1;
   std::string json_file;
