@@ -9,6 +9,7 @@ namespace urban_gnss {
 namespace {
 
 constexpr std::size_t kMaxRecent = 100;
+constexpr double kClockSetBack_s = 1.0;
 
 bool is_finite(const GeodeticPosition& place) {
   return std::isfinite(place.latitude_deg) && std::isfinite(place.longitude_deg) && std::isfinite(place.altitude_m);
@@ -68,7 +69,7 @@ void ReceiverCounter::add(const ReceiverOutput& output) {
   }
 }
 
-ReceiverInput::ReceiverInput(const ReceiverPreset& preset) {
+ReceiverInput::ReceiverInput(const ReceiverPreset& preset) : preset_(&preset) {
   if (preset.make == nullptr) throw std::invalid_argument("receiver " + preset.name + " has no decoder");
   decoder_ = preset.make();
 }
@@ -83,6 +84,11 @@ const MessageDefinition& ReceiverInput::definition_of(const MessageConnection& c
 void ReceiverInput::add(const ReceiverTopic& topic, const MessageConnection& connection, const std::uint8_t* data,
                         std::size_t size, Stamp arrival) {
   ++received_[connection.topic];
+  if (to_seconds(last_arrival_ - arrival) > kClockSetBack_s) {
+    decoder_ = preset_->make();
+    warnings_.push_back("the clock was set back: receiver " + preset_->name + " begins anew");
+  }
+  last_arrival_ = arrival;
   try {
     const MessageView message(definition_of(connection), data, size);
     const bool is_of_antenna = topic.role == ReceiverRole::kFix || topic.role == ReceiverRole::kGpsFix ||

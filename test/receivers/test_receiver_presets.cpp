@@ -79,6 +79,17 @@ TEST(MavrosDecoder, AStampOfZeroIsThatOfTheArrivalAndSaidSo) {
   EXPECT_THAT(feed.output().warnings[0], HasSubstr("header.stamp is 0"));
 }
 
+TEST(ReceiverInput, BeginsAnewWhereTheClockIsSetBack) {
+  Feed feed("mavros");
+  feed.add(ReceiverRole::kFix, kNavSatFix, mavros_fix(4.0, 2), Stamp(100000000000));
+  feed.add(ReceiverRole::kFix, kNavSatFix, mavros_fix(4.0, 2), Stamp(99500000000));
+  EXPECT_THAT(feed.output().warnings, IsEmpty());
+  feed.add(ReceiverRole::kFix, kNavSatFix, mavros_fix(4.0, 2), Stamp(90000000000));
+  ASSERT_THAT(feed.output().warnings, SizeIs(1));
+  EXPECT_THAT(feed.output().warnings[0], HasSubstr("set back"));
+  EXPECT_THAT(feed.output().fixes, SizeIs(3));
+}
+
 TEST(ReceiverInput, AMalformedDefinitionIsSaidOnceAndDoesNoHarm) {
   Feed feed("mavros");
   for (int i = 0; i < 3; ++i) feed.add(ReceiverRole::kFix, {"a/B", "Header header\n"}, mavros_fix(4.0, 2));
@@ -106,7 +117,7 @@ TEST(ReceiverInput, SurvivesAnyMessage) {
       const std::size_t size = random() % 400;
       // Mostly zeros, so that some of it can be read.
       while (bytes.bytes().size() < size) bytes.put(static_cast<std::uint8_t>(random() % 3 == 0 ? random() : 0));
-      feed.add(role, connection, bytes, Stamp(static_cast<std::int64_t>(random() >> 2U)));
+      feed.add(role, connection, bytes, Stamp(100000000LL * round));
     }
     for (std::size_t cut = 0; cut < 300; ++cut) feed.add(ReceiverRole::kNavPvt, kNavPvt, MessageBytes().zeros(cut));
     for (std::size_t cut = 0; cut < 300; ++cut) feed.add(ReceiverRole::kGpsFix, kGpsFix, MessageBytes().zeros(cut));

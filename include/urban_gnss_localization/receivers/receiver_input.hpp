@@ -56,8 +56,8 @@ class ReceiverInput {
   /// Requires a preset with a decoder.
   explicit ReceiverInput(const ReceiverPreset& preset);
 
-  /// `arrival`: when the message was received or recorded. Looks at the definition only with the first message of a
-  /// connection.
+  /// `arrival`: when the message was received or recorded; where it goes back by more than a second, everything begins
+  /// anew. Looks at the definition only with the first message of a connection.
   void add(const ReceiverTopic& topic, const MessageConnection& connection, const std::uint8_t* data, std::size_t size,
            Stamp arrival);
   void finish();
@@ -77,7 +77,9 @@ class ReceiverInput {
   const MessageDefinition& definition_of(const MessageConnection& connection);
   void note_error(const MessageConnection& connection, const std::string& error);
 
+  const ReceiverPreset* preset_;
   std::unique_ptr<ReceiverDecoder> decoder_;
+  Stamp last_arrival_{0};
   std::map<std::string, std::unique_ptr<MessageDefinition>> definitions_;  ///< by topic, type and md5
   ReceiverCounter counter_;
   std::map<std::string, std::size_t> received_;

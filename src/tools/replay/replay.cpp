@@ -131,6 +131,7 @@ int replay_main(int argc, char** argv, const LocalizerRegistry& localizers) {
   CLI::App& app = line.app();
   auto* input = app.add_option("bag", options.input, "the bag to read");
   bool only_names = false;
+  bool only_receivers = false;
   std::string odometry = "topic";
   app.add_flag("--list-variants", only_names, "print the names under which localizers are compared, and end");
   app.add_option("--localizer", options.localizer, localizers.names() + ", or a name of --list-variants");
@@ -151,6 +152,8 @@ int replay_main(int argc, char** argv, const LocalizerRegistry& localizers) {
   app.add_option("--receiver", options.receiver,
                  "whose messages tell fix, velocity and satellites: " + receiver_preset_names() +
                      "; navsatfix: --fix-topic and the other two");
+  app.add_flag("--list-receivers", only_receivers,
+               "print receiver, driver, topic, types and use, separated by tabs, and end");
   app.add_option("--receiver-ns", options.receiver_ns, "namespace of the receiver's topics; default: found in the bag");
   app.add_option("--odom", odometry,
                  "topic: of --odom-topic; none: a constant-velocity model, of what the receiver says of its motion")
@@ -165,6 +168,10 @@ int replay_main(int argc, char** argv, const LocalizerRegistry& localizers) {
   app.add_option("--tum", options.tum_file, "write the trajectory here (TUM format, ENU about the datum)");
   return line.run(argc, argv, [&] {
     if (only_names) return print_variants(localizers);
+    if (only_receivers) {
+      std::cout << describe_receiver_presets();
+      return;
+    }
     if (input->count() == 0) throw std::runtime_error("which bag? See --help");
     options.wants_velocity = velocity_topic->count() > 0 && !options.velocity_topic.empty();
     options.wants_satellites = satellites_topic->count() > 0 && !options.satellites_topic.empty();
