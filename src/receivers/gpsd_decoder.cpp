@@ -11,10 +11,10 @@ namespace urban_gnss {
 namespace {
 
 constexpr Stamp kSameTime = std::chrono::milliseconds(10);
-constexpr Stamp kMostAhead = std::chrono::milliseconds(300);  // satellites before their solution, by arrival
 constexpr Stamp kOneReport = std::chrono::milliseconds(500);  // reports without a time that are of one solution
 constexpr double kSigmasOf95 = 1.959964;                      // of a normal error in one axis
 constexpr double kSigmasOf95In2d = 2.447747;                  // sqrt of chi^2 with two degrees of freedom
+constexpr std::size_t kMostPending = 100;
 constexpr int kReckoned = 5;
 constexpr int kSimulated = 8;
 
@@ -25,7 +25,7 @@ void GpsdDecoder::add(std::string_view line, std::optional<Stamp> arrival) {
   if (const auto* position = std::get_if<GpsdPosition>(&report)) {
     if (is_used(position->device)) take_position(*position, arrival);
   } else if (const auto* sky = std::get_if<GpsdSky>(&report)) {
-    if (is_used(sky->device)) take_sky(*sky, arrival);
+    if (is_used(sky->device)) take_sky(*sky);
   } else if (const auto* errors = std::get_if<GpsdErrors>(&report)) {
     if (is_used(errors->device)) take_errors(*errors);
   } else if (const auto* version = std::get_if<GpsdVersion>(&report)) {
@@ -49,14 +49,14 @@ ReceiverOutput GpsdDecoder::take() { return std::exchange(output_, {}); }
 
 void GpsdDecoder::settle() {
   if (!open_) return;
+  if (!open_->satellites_given_out) take_pending();
   give_out();
-  give_out_satellites();
 }
 
 void GpsdDecoder::reset() {
   settle();
   open_.reset();
-  ahead_.clear();
+  pending_ = {};
   device_.clear();
   drivers_.clear();
   release_.clear();
@@ -81,36 +81,48 @@ void GpsdDecoder::take_position(const GpsdPosition& position, std::optional<Stam
     joins = !arrival || !open_->arrival || *arrival - *open_->arrival < kOneReport;
   }
   if (!joins) {
-    settle();
+    if (open_) give_out();
     open_.emplace();
     open_->time = position.time;
     open_->arrival = arrival;
-    for (const Ahead& each : std::exchange(ahead_, {})) {
-      if (!arrival || !each.arrival || *arrival - *each.arrival <= kMostAhead) open_->sky.merge(each.sky);
-    }
   }
+  take_pending();
   open_->position = position;
   if (!open_->position.time) open_->position.time = open_->time;
 }
 
-void GpsdDecoder::take_sky(const GpsdSky& sky, std::optional<Stamp> arrival) {
-  const bool is_late = open_ && open_->satellites_given_out;
-  const bool joins = open_ && !is_late && (!sky.time || !open_->time || is_of_open(sky.time));
-  if (joins) {
+void GpsdDecoder::take_sky(const GpsdSky& sky) {
+  if (is_of_open(sky.time)) {
     open_->sky.merge(sky);
-  } else if (!is_of_open(sky.time)) {
-    ahead_.push_back({sky, arrival});
-    constexpr std::size_t kMost = 20;
-    if (ahead_.size() > kMost) ahead_.erase(ahead_.begin());
+  } else if (pending_.skies.size() < kMostPending) {
+    pending_.skies.push_back(sky);
   }
 }
 
 void GpsdDecoder::take_errors(const GpsdErrors& errors) {
-  if (open_ && (!errors.time || is_of_open(errors.time))) open_->errors = errors;
+  if (is_of_open(errors.time)) {
+    open_->errors = errors;
+  } else {
+    pending_.errors = errors;
+  }
 }
 
+/// What came since the last TPV, where it is of the open solution.
+void GpsdDecoder::take_pending() {
+  const Pending pending = std::exchange(pending_, {});
+  for (const GpsdSky& sky : pending.skies) {
+    if (!sky.time || !open_->time || is_of_open(sky.time)) open_->sky.merge(sky);
+  }
+  if (pending.errors && (!pending.errors->time || is_of_open(pending.errors->time))) open_->errors = pending.errors;
+}
+
+/// Of the open solution, what has not been given out.
 void GpsdDecoder::give_out() {
-  if (open_->is_given_out) return;
+  if (!open_->is_given_out) give_out_fix();
+  if (!open_->satellites_given_out) give_out_satellites();
+}
+
+void GpsdDecoder::give_out_fix() {
   open_->is_given_out = true;
   const bool wants_utc = parameters_.stamps == GpsdStamps::kUtc || !open_->arrival;
   open_->stamp = wants_utc ? open_->time : open_->arrival;
@@ -124,7 +136,7 @@ void GpsdDecoder::give_out() {
 }
 
 void GpsdDecoder::give_out_satellites() {
-  if (!open_->stamp || open_->satellites_given_out || !open_->sky.has_list) return;
+  if (!open_->stamp || !open_->sky.has_list) return;
   open_->satellites_given_out = true;
   SatelliteEpoch epoch;
   epoch.stamp = *open_->stamp;

@@ -18,10 +18,6 @@ bool has_time(const NmeaSentence& sentence) {
   static const std::set<std::string> types{"GGA", "RMC", "GNS", "GLL", "GST", "GRS", "GBS"};
   return types.count(sentence.type) > 0;
 }
-/// Whether it tells of a position even without a time, as before there is a fix.
-bool has_status(const NmeaSentence& sentence) {
-  return sentence.type == "GGA" || sentence.type == "RMC" || sentence.type == "GNS" || sentence.type == "GLL";
-}
 bool has_no_time(const NmeaSentence& sentence) {
   return sentence.type == "GSA" || sentence.type == "GSV" || sentence.type == "VTG";
 }
@@ -99,7 +95,7 @@ void NmeaDecoder::take_timed(const NmeaSentence& sentence, std::optional<Stamp> 
       open(time, arrival);
     }
     if (!open_->time) open_->time = time;
-  } else if (has_status(sentence)) {
+  } else if (is_about_position(sentence)) {
     if (!open_ || open_->seen.count(key_of(sentence)) > 0) {
       close();
       open(std::nullopt, arrival);

@@ -11,7 +11,7 @@ namespace {
 
 constexpr double kMetresPerSecondOfKnot = 1852.0 / 3600.0;
 constexpr double kMostSigma_m = 100000.0;
-enum PositionRank { kGga, kGns, kRmc, kGll };
+enum PositionRank { kGga, kGns, kGll, kRmc };  // a chart plotter was seen to send the last position in RMC
 
 double number_or_nan(std::string_view field) { return to_number(field).value_or(std::nan("")); }
 
@@ -38,6 +38,7 @@ char best_mode(std::string_view modes) {
 }  // namespace
 
 void NmeaSolution::add(const NmeaSentence& sentence) {
+  has_status_ = has_status_ || is_about_position(sentence);
   if (sentence.type == "GGA") add_gga(sentence);
   if (sentence.type == "GNS") add_gns(sentence);
   if (sentence.type == "RMC") add_rmc(sentence);
@@ -180,6 +181,10 @@ std::optional<RawVelocity> NmeaSolution::velocity(Stamp stamp, const NmeaParamet
   const double speed = rmc_has_it ? rmc_speed_ : vtg_speed_;
   const double course = rmc_has_it ? rmc_course_ : vtg_course_;
   return ground_velocity(stamp, speed, course);
+}
+
+bool is_about_position(const NmeaSentence& sentence) {
+  return sentence.type == "GGA" || sentence.type == "GNS" || sentence.type == "RMC" || sentence.type == "GLL";
 }
 
 std::optional<Stamp> time_of_day(const NmeaSentence& sentence) {

@@ -51,15 +51,10 @@ json line_of(const SatelliteEpoch& epoch) {
   return {{"class", "satellites"}, {"stamp", format_stamp(epoch.stamp)}, {"satellites", std::move(list)}};
 }
 
-/// All of a solution stands together: each list is in the order of the solutions.
 void print_lines(const ReceiverOutput& output) {
-  auto velocity = output.velocities.begin();
-  auto epoch = output.satellites.begin();
-  for (const RawFix& fix : output.fixes) {
-    std::cout << line_of(fix) << '\n';
-    if (velocity != output.velocities.end() && velocity->stamp == fix.stamp) std::cout << line_of(*velocity++) << '\n';
-    if (epoch != output.satellites.end() && epoch->stamp == fix.stamp) std::cout << line_of(*epoch++) << '\n';
-  }
+  for (const RawFix& fix : output.fixes) std::cout << line_of(fix) << '\n';
+  for (const RawVelocity& velocity : output.velocities) std::cout << line_of(velocity) << '\n';
+  for (const SatelliteEpoch& epoch : output.satellites) std::cout << line_of(epoch) << '\n';
 }
 
 }  // namespace
@@ -79,7 +74,9 @@ int main(int argc, char** argv) {
   return line.run(argc, argv, [&] {
     const auto day = date.empty() ? std::nullopt : std::optional<Day>(parse_date(date));
     const NmeaLog log = by_lines ? read_nmea_log_by_lines(file) : read_nmea_log(file, day);
-    if (!wants_summary) print_lines(log.output);
+    if (!wants_summary) {
+      for (const TimedOutput& solution : to_recording(log, file).outputs) print_lines(solution.output);
+    }
     for (const std::string& warning : log.output.warnings) std::cerr << warning << '\n';
     std::ostream& summary = wants_summary ? std::cout : std::cerr;
     summary << summary_of(log) << '\n';

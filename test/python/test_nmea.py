@@ -2,15 +2,14 @@
 
 A `.chk` has the sentences of a log, each followed by what gpsd reports then: TPV (fix) and SKY (satellites). gpsd reports
 a solution while it grows, so the last report of a time is the whole one, and those before it may have less."""
+import bisect
 import collections
 import csv
 import datetime
 import json
 import math
 import os
-import re
 import subprocess
-import sys
 import unittest
 
 PROGRAMS = os.environ.get("URBAN_GNSS_PROGRAMS", "")
@@ -111,31 +110,25 @@ def ours_as_sky(epoch):
 
 
 def compare_skies(solutions, chk):
-    """Counts of SKYs with satellites: whole ones (the last of an epoch) are to be equal, others to be a part of ours."""
+    """Counts of gpsd's SKYs with satellites, and how many of our lists one of them is equal to.
+
+    gpsd reports a sky while it grows: such a part may lack satellites and signals that ours has, nothing else. A SKY is
+    of the solution that was open, or of the next where the receiver sends GSV first."""
     starts = [round(float(each["fix"]["stamp"]) * 1e9) for each in solutions]
-    skies = [(number, merged(report["satellites"])) for number, report in read_reports(chk)
-             if report["class"] == "SKY" and report.get("satellites")]
-    with open(chk, encoding="utf-8", errors="replace") as file:
-        gsv = [number for number, line in enumerate(file, 1) if re.match(r"\$..GSV", line)]
-    result = collections.Counter()
-    for number, sky in skies:
-        before = [i for i, start in enumerate(starts) if start <= number]
-        candidates = ([before[-1]] if before else []) + ([before[-1] + 1] if before else [0])
-        verdicts = []
-        for index in candidates:
-            if index < len(solutions) and "satellites" in solutions[index]:
-                ours = ours_as_sky(solutions[index]["satellites"])
-                if sky == ours:
-                    verdicts.append("equal")
-                elif all(key in ours and ours[key][0] == direction and ours[key][1] >= cn0
-                         for key, (direction, cn0) in sky.items()):
-                    verdicts.append("part")
-        order = ["equal", "part"]
-        result[min(verdicts, key=order.index) if verdicts else "different"] += 1
-        if not verdicts and os.environ.get("NMEA_VERBOSE"):
-            print(chk, number, [solutions[i]["fix"]["stamp"] for i in candidates if i < len(solutions)], sky, file=sys.stderr)
-            for i in candidates:
-                if i < len(solutions) and "satellites" in solutions[i]:
-                    ours = ours_as_sky(solutions[i]["satellites"])
-                    print({k: (v, ours.get(k)) for k, v in sky.items() if ours.get(k) != v}, {k: v for k, v in ours.items() if k not in sky}, file=sys.stderr)
+    result, whole = collections.Counter(), set()
+    for number, report in read_reports(chk):
+        if report["class"] != "SKY" or not report.get("satellites"):
+            continue
+        sky = merged(report["satellites"])
+        last = bisect.bisect_right(starts, number) - 1
+        candidates = {i: ours_as_sky(solutions[i]["satellites"]) for i in (last, last + 1)
+                      if 0 <= i < len(solutions) and "satellites" in solutions[i]}
+        equal = [i for i, ours in candidates.items() if sky == ours]
+        part = any(all(key in ours and ours[key][0] == direction and ours[key][1] >= cn0
+                       for key, (direction, cn0) in sky.items()) for ours in candidates.values())
+        result["equal" if equal else "part" if part else "different"] += 1
+        whole.update(equal)
+    lists = {i for i, each in enumerate(solutions) if each.get("satellites", {}).get("satellites")}
+    result["lists"] = len(lists)
+    result["lists that no SKY equals"] = len(lists - whole)
     return dict(result)

@@ -46,10 +46,23 @@ TEST(GpsdReports, TimesAreUtc) {
   }
 }
 
-TEST(GpsdDecoder, ReportsOfOneTimeAreOneSolution) {
+TEST(GpsdDecoder, SatellitesAreOfTheReportAtTheEndOfTheCycle) {
+  const std::string gst = R"({"class":"GST","device":"/dev/a",)" + at(1) + R"(,"lat":3.0,"lon":2.0,"alt":5.0})";
   const ReceiverOutput output =
-      decode({tpv(0), tpv(0, R"("speed":2.0,"track":90.0)"), sky(satellite(0, 5, 40) + "," + satellite(6, 1, 30)),
-              tpv(1), sky(satellite(0, 5, 41))});
+      decode({tpv(0), sky(satellite(0, 5, 40)), sky(satellite(0, 5, 41) + "," + satellite(6, 1, 30)), gst, tpv(1),
+              sky(satellite(0, 7, 40)), tpv(2)});
+  ASSERT_EQ(output.satellites.size(), 2U);
+  EXPECT_EQ(output.satellites[0].stamp, kNoon + 1s);
+  EXPECT_EQ(output.satellites[0].satellites.size(), 2U);
+  EXPECT_EQ(output.satellites[0].satellites[0].cn0_dbhz, 41.0);
+  EXPECT_EQ(output.satellites[1].stamp, kNoon + 2s);
+  EXPECT_EQ(output.fixes.at(0).covariance_type, CovarianceType::kUnknown);
+  EXPECT_EQ(output.fixes.at(1).covariance_type, CovarianceType::kKnown);
+}
+
+TEST(GpsdDecoder, ReportsOfOneTimeAreOneSolution) {
+  const ReceiverOutput output = decode({tpv(0), sky(satellite(0, 5, 40) + "," + satellite(6, 1, 30)),
+                                        tpv(0, R"("speed":2.0,"track":90.0)"), tpv(1), sky(satellite(0, 5, 41))});
   ASSERT_EQ(output.fixes.size(), 2U);
   ASSERT_EQ(output.velocities.size(), 1U);
   ASSERT_EQ(output.satellites.size(), 2U);

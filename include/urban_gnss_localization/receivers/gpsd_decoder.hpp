@@ -40,10 +40,10 @@ struct GpsdParameters {
 /// The reports of gpsd (lines of JSON, gpsd_json(5), since 3.19) in, solutions out.
 ///
 /// Reports TPV, GST and SKY with the same time are of one solution, which grows: the last TPV counts, and SKYs are put
-/// together, for gpsd sends them after each group of GSV. A SKY without a time (from NMEA) is of the solution that is
-/// open. A solution is complete when a TPV with another time comes, and at settle(), which is to be called where
-/// nothing has come for a while. Satellites that come later still are given out with their solution's stamp, where it
-/// had none.
+/// together, for gpsd sends one after each group of GSV. From NMEA a SKY has no time. It is of the solution of the next
+/// TPV, for gpsd sends that at the end of the receiver's cycle; where nothing comes for a while, of the TPV before it,
+/// if that has no satellites yet. A solution is complete when a TPV with another time comes, and at settle(), which is
+/// to be called where nothing has come for a while. Satellites that come later still have their solution's stamp.
 ///
 /// - There is a fix with mode 2 or 3, unless gpsd says that the receiver reckons (status 5) or simulates (8). Altitude
 ///   is altHAE; unknown in mode 2.
@@ -81,17 +81,20 @@ class GpsdDecoder {
     bool is_given_out{false};
     bool satellites_given_out{false};
   };
-  struct Ahead {
-    GpsdSky sky;
-    std::optional<Stamp> arrival;
+  /// Since the last TPV.
+  struct Pending {
+    std::vector<GpsdSky> skies;
+    std::optional<GpsdErrors> errors;
   };
 
   void take_position(const GpsdPosition& position, std::optional<Stamp> arrival);
-  void take_sky(const GpsdSky& sky, std::optional<Stamp> arrival);
+  void take_sky(const GpsdSky& sky);
   void take_errors(const GpsdErrors& errors);
+  void take_pending();
   bool is_of_open(std::optional<Stamp> time) const;
   bool is_used(const std::string& device);
   void give_out();
+  void give_out_fix();
   void give_out_satellites();
   RawFix fix() const;
   void set_covariance(RawFix& fix) const;
@@ -102,7 +105,7 @@ class GpsdDecoder {
   GpsdParameters parameters_;
   ReceiverOutput output_;
   std::optional<Solution> open_;
-  std::vector<Ahead> ahead_;  ///< satellites that came before their solution
+  Pending pending_;
   std::string release_;
   std::string device_;
   int mode_{0};

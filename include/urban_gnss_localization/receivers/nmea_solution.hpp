@@ -30,7 +30,7 @@ struct NmeaParameters {
 /// - There is a fix where none of GGA, GNS, RMC and GLL denies it and one affirms it. Positions that the receiver
 ///   reckons without satellites (quality 6, mode E) or was told (7, M) are no fixes, nor are simulated ones (8, S)
 ///   unless they are accepted. GSA tells 2-D from 3-D only: in 2-D the receiver holds the altitude, so it is unknown.
-/// - The position is that of GGA, else GNS, RMC, GLL. Altitude is above the ellipsoid: antenna's above sea level plus
+/// - The position is that of GGA, else GNS, GLL, RMC. Altitude is above the ellipsoid: antenna's above sea level plus
 ///   the geoid's, which is taken to be 0 where it is missing; RMC and GLL have none (NaN).
 /// - The covariance is that of GST: its ellipse where it agrees with the sigmas of latitude and longitude, else these.
 ///   Without a GST it is made of HDOP and VDOP; without these it is not declared.
@@ -43,7 +43,7 @@ class NmeaSolution {
   void add(const NmeaSentence& sentence);
 
   /// Whether any sentence was about a position, if only to say that there is none.
-  bool has_status() const { return denied_ || affirmed_; }
+  bool has_status() const { return has_status_; }
   bool has_fix(const NmeaParameters& parameters) const;
 
   /// `stamp` is given to both.
@@ -73,6 +73,7 @@ class NmeaSolution {
   double altitude(const NmeaSentence& sentence, std::size_t above_sea, std::size_t geoid);
   SolutionKind kind() const;
 
+  bool has_status_{false};
   bool affirmed_{false};
   bool denied_{false};
   int quality_{0};    ///< of GGA; 0 where there is none
@@ -89,6 +90,8 @@ class NmeaSolution {
   double vtg_speed_{kUnknown}, vtg_course_{kUnknown};
 };
 
+/// Whether it is one of those that tell a position, if only that there is none: GGA, GNS, RMC, GLL.
+bool is_about_position(const NmeaSentence& sentence);
 /// The time of day that a sentence has; nothing for types without one, or where the field is empty.
 std::optional<Stamp> time_of_day(const NmeaSentence& sentence);
 /// The date that a sentence RMC or ZDA has.

@@ -5,6 +5,8 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "urban_gnss_localization/receivers/receiver_input.hpp"
+
 namespace urban_gnss {
 namespace {
 
@@ -39,7 +41,8 @@ std::size_t fixes_in(const ReceiverOutput& output) {
 }  // namespace
 
 ReceiverRecording to_recording(const NmeaLog& log, const std::string& source) {
-  ReceiverRecording recording{source, {}};
+  ReceiverRecording recording;
+  recording.source = source;
   const ReceiverOutput& output = log.output;
   auto velocity = output.velocities.begin();
   auto epoch = output.satellites.begin();
@@ -52,6 +55,9 @@ ReceiverRecording to_recording(const NmeaLog& log, const std::string& source) {
     }
     if (epoch != output.satellites.end() && epoch->stamp == fix.stamp) timed.output.satellites.push_back(*epoch++);
   }
+  ReceiverCounter counter;
+  for (const TimedOutput& each : recording.outputs) counter.add(each.output);
+  recording.counts = counter.counts();
   return recording;
 }
 

@@ -59,7 +59,7 @@ void print_summary(const ReplayRun& replay, const nlohmann::json& metrics, doubl
 
 nlohmann::json metrics_of(const ReplayOptions& options, const ReplaySettings& settings, const ReplayRun& replay) {
   const LocalizationReport report = replay.pipeline().report();
-  nlohmann::json metrics = {{"bag", fs::path(options.input).filename().string()},
+  nlohmann::json metrics = {{"bag", fs::path(options.input.empty() ? options.nmea : options.input).filename().string()},
                             {"localizer", replay.pipeline().localizer().name()},
                             {"mode", replay.pipeline().localizer().mode()},
                             {"seed", settings.seed},
@@ -158,6 +158,9 @@ int replay_main(int argc, char** argv, const LocalizerRegistry& localizers) {
   app.add_option("--odom", odometry,
                  "topic: of --odom-topic; none: a constant-velocity model, of what the receiver says of its motion")
       ->check(CLI::IsMember({"topic", "none"}));
+  app.add_option("--nmea", options.nmea,
+                 "log of NMEA 0183 in place of the bag's fixes, velocities and satellites; its stamps are UTC");
+  app.add_option("--nmea-date", options.nmea_date, "YYYY-MM-DD of its first sentence, in place of the log's own dates");
   app.add_option("--truth-topic", options.truth_topic, "nav_msgs/Odometry, for the errors only");
   app.add_option("--datum", options.datum,
                  "LAT,LON,ALT (deg, deg, m); default: the bag's gps/datum, or the first fixes")
@@ -172,7 +175,10 @@ int replay_main(int argc, char** argv, const LocalizerRegistry& localizers) {
       std::cout << describe_receiver_presets();
       return;
     }
-    if (input->count() == 0) throw std::runtime_error("which bag? See --help");
+    if (input->count() == 0 && options.nmea.empty()) throw std::runtime_error("which bag? See --help");
+    if (input->count() == 0 && odometry != "none") {
+      throw std::runtime_error("--nmea needs a bag with odometry, or --odom none");
+    }
     options.wants_velocity = velocity_topic->count() > 0 && !options.velocity_topic.empty();
     options.wants_satellites = satellites_topic->count() > 0 && !options.satellites_topic.empty();
     options.wants_imu = imu_topic->count() > 0 && !options.imu_topic.empty();

@@ -2,11 +2,14 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <iostream>
 #include <stdexcept>
 #include <string>
 
 #include "bag_messages.hpp"
 #include "bag_receiver.hpp"
+#include "nmea_log.hpp"
+#include "urban_gnss_localization/evaluation/stamp_text.hpp"
 #include "urban_gnss_localization/ros/conversions.hpp"
 #include "urban_gnss_localization/ros/receiver_messages.hpp"
 #include "urban_gnss_localization/ros/topics.hpp"
@@ -70,25 +73,42 @@ void give(const rosbag::MessageInstance& message, const Topics& names, ReplayRun
   }
 }
 
+constexpr auto is_earlier = [](const auto& a, const auto& b) { return a.time < b.time; };
+
+ReceiverRecording read_nmea_recording(const ReplayOptions& options) {
+  if (options.receiver != "navsatfix") throw std::runtime_error("--nmea and --receiver: give one of them");
+  const auto day = options.nmea_date.empty() ? std::nullopt : std::optional<Day>(parse_date(options.nmea_date));
+  const NmeaLog log = read_nmea_log(options.nmea, day);
+  for (const std::string& warning : log.output.warnings) std::cerr << options.nmea << ": " << warning << '\n';
+  std::cerr << options.nmea << ": " << summary_of(log) << '\n';
+  ReceiverRecording recording = to_recording(log, options.nmea);
+  if (recording.outputs.empty()) throw std::runtime_error(options.nmea + ": no solution in it can be used");
+  return recording;
+}
+
 }  // namespace
 
 ReplayInputs::ReplayInputs(const ReplayOptions& options) {
-  if (!std::filesystem::exists(options.input)) throw std::runtime_error(options.input + ": no such bag");
-  bag_.open(options.input, rosbag::bagmode::Read);
+  if (!options.input.empty()) {
+    if (!std::filesystem::exists(options.input)) throw std::runtime_error(options.input + ": no such bag");
+    bag_.open(options.input, rosbag::bagmode::Read);
+  }
   read_receiver(options);
-  read_topics(options);
+  if (bag_.isOpen()) read_topics(options);
   if (options.without_odometry) read_odometry_of_receiver();
   if (receiver_) {
+    require_overlap();
     for (const TimedOutput& each : receiver_->outputs) {
       inputs_.push_back({each.time, [&output = each.output](ReplayRun& run) { run.add_receiver(output); }});
     }
   }
-  std::stable_sort(inputs_.begin(), inputs_.end(),
-                   [](const ReplayInput& a, const ReplayInput& b) { return a.time < b.time; });
+  std::stable_sort(inputs_.begin(), inputs_.end(), is_earlier);
 }
 
 void ReplayInputs::read_receiver(const ReplayOptions& options) {
-  if (find_receiver_preset(options.receiver).make != nullptr) {
+  if (!options.nmea.empty()) {
+    receiver_ = read_nmea_recording(options);
+  } else if (find_receiver_preset(options.receiver).make != nullptr) {
     receiver_ = decode_receiver(bag_, options);
   } else if (options.without_odometry) {
     receiver_ = read_receiver_topics(bag_, options);
@@ -118,6 +138,17 @@ void ReplayInputs::read_odometry_of_receiver() {
   for (const TimedOdometry& each : odometry_of(*receiver_)) {
     inputs_.push_back({each.time, [sample = each.sample](ReplayRun& run) { run.add_odometry(sample); }});
   }
+}
+
+/// Throws std::runtime_error where bag and receiver are of different times.
+void ReplayInputs::require_overlap() const {
+  if (inputs_.empty() || receiver_->outputs.empty()) return;
+  const auto [first, last] = std::minmax_element(inputs_.begin(), inputs_.end(), is_earlier);
+  const auto [from, to] = std::minmax_element(receiver_->outputs.begin(), receiver_->outputs.end(), is_earlier);
+  if (first->time <= to->time && from->time <= last->time) return;
+  throw std::runtime_error(receiver_->source + " is of " + format_stamp(from->time) + " to " + format_stamp(to->time) +
+                           " s, the rest of " + format_stamp(first->time) + " to " + format_stamp(last->time) +
+                           " s: nothing is of the same time (a wrong date?)");
 }
 
 double ReplayInputs::duration_s() const {

@@ -36,6 +36,7 @@ class ReplayInputs {
   void read_receiver(const ReplayOptions& options);
   void read_topics(const ReplayOptions& options);
   void read_odometry_of_receiver();
+  void require_overlap() const;
 
   rosbag::Bag bag_;
   std::optional<ReceiverRecording> receiver_;

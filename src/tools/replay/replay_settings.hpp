@@ -29,6 +29,8 @@ struct ReplayOptions {
   std::string receiver = "navsatfix";  ///< a name of receiver_presets()
   std::string receiver_ns;             ///< empty: to be found
   bool without_odometry = false;       ///< --odom none
+  std::string nmea;                    ///< a log that takes the place of the bag's fixes, velocities and satellites
+  std::string nmea_date;               ///< of its first sentence, YYYY-MM-DD; empty: its own
   std::vector<double> datum;
   int seed = -1;
   std::string json_file;
