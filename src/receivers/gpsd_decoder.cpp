@@ -141,7 +141,7 @@ void GpsdDecoder::give_out_satellites() {
   SatelliteEpoch epoch;
   epoch.stamp = *open_->stamp;
   epoch.angle_resolution_rad = open_->sky.has_whole_degrees ? degrees_to_radians(1.0) : 0.0;
-  for (const auto& [id, satellite] : open_->sky.satellites) epoch.satellites.push_back(satellite);
+  for (const auto& [id, each] : open_->sky.satellites) epoch.satellites.push_back(each.satellite);
   output_.satellites.push_back(std::move(epoch));
 }
 

@@ -86,12 +86,11 @@ void add_satellite(const json& satellite, GpsdSky& sky) {
   for (const double angle : {azimuth_deg, elevation_deg}) {
     if (std::isfinite(angle) && angle != std::round(angle)) sky.has_whole_degrees = false;
   }
-  observation.cn0_dbhz = number(satellite, "ss", 0.1, kMostCn0_dbhz);
-  observation.tracked = has_cn0(observation);
   if (flag(satellite, "used")) observation.residual_m = number(satellite, "prRes", -kMostResidual_m, kMostResidual_m);
   GpsdSky one;
   one.has_whole_degrees = sky.has_whole_degrees;
-  one.satellites.emplace(*id, observation);
+  one.satellites[*id].satellite = observation;
+  one.satellites[*id].add_signal(integer(satellite, "sigid", 0), number(satellite, "ss", 0.1, kMostCn0_dbhz));
   sky.merge(one);  // a satellite is listed once for each of its signals
 }
 
@@ -129,14 +128,13 @@ void GpsdSky::merge(const GpsdSky& other) {
   if (std::isfinite(other.vdop)) vdop = other.vdop;
   has_list = has_list || other.has_list;
   has_whole_degrees = has_whole_degrees && other.has_whole_degrees;
-  for (const auto& [id, satellite] : other.satellites) {
-    const auto [place, is_new] = satellites.emplace(id, satellite);
-    SatelliteObservation& mine = place->second;
+  for (const auto& [id, theirs] : other.satellites) {
+    const auto [place, is_new] = satellites.emplace(id, theirs);
     if (is_new) continue;
-    if (has_direction(satellite)) mine.look = satellite.look;
-    if (has_cn0(satellite) && !(mine.cn0_dbhz >= satellite.cn0_dbhz)) mine.cn0_dbhz = satellite.cn0_dbhz;
-    mine.tracked = has_cn0(mine);
-    if (std::isfinite(satellite.residual_m)) mine.residual_m = satellite.residual_m;
+    SatelliteSignals& mine = place->second;
+    if (has_direction(theirs.satellite)) mine.satellite.look = theirs.satellite.look;
+    if (std::isfinite(theirs.satellite.residual_m)) mine.satellite.residual_m = theirs.satellite.residual_m;
+    mine.add_signals(theirs.signals);
   }
 }
 

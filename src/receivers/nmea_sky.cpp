@@ -26,6 +26,12 @@ double step_of(std::string_view field) {
   return point == std::string_view::npos ? 1.0 : std::pow(10.0, -static_cast<double>(field.size() - point - 1));
 }
 
+/// By the signal id of NMEA 4.10: 1 is the first signal of each system (L1 C/A, G1 C/A, B1I), but 7 of Galileo (E1).
+int signal_rank(Constellation system, std::string_view signal) {
+  const bool is_first = signal.empty() || signal == "0" || signal == (system == Constellation::kGalileo ? "7" : "1");
+  return is_first || signal.size() != 1 ? 0 : signal[0];
+}
+
 }  // namespace
 
 void NmeaSky::add_gsv(const NmeaSentence& sentence) {
@@ -40,6 +46,7 @@ void NmeaSky::add_gsv(const NmeaSentence& sentence) {
   const bool has_system_id = behind == count * kEach + 2;
   const Constellation system =
       nmea_system(sentence.talker, has_system_id ? sentence.field(sentence.fields.size() - 1) : std::string_view());
+  const int rank = signal_rank(system, sentence.field(kBefore + count * kEach));
   for (std::size_t i = 0; i < count; ++i) {
     const std::size_t at = kBefore + kEach * i;
     const auto number = to_count(sentence.field(at));
@@ -50,7 +57,7 @@ void NmeaSky::add_gsv(const NmeaSentence& sentence) {
       continue;
     }
     const auto [place, is_new] = in_view_.try_emplace(*id);
-    SatelliteObservation& satellite = place->second;
+    SatelliteObservation& satellite = place->second.satellite;
     satellite.id = *id;
     const LookAngles look{angle_rad(sentence.field(at + 2), 0.0, 360.0),
                           angle_rad(sentence.field(at + 1), -90.0, 90.0)};
@@ -61,8 +68,8 @@ void NmeaSky::add_gsv(const NmeaSentence& sentence) {
       angle_resolution_rad_ = std::max(angle_resolution_rad_, degrees_to_radians(step));
     }
     const double cn0 = to_number(sentence.field(at + 3)).value_or(0.0);
-    if (cn0 > 0.0 && cn0 <= kMostCn0_dbhz && !(satellite.cn0_dbhz >= cn0)) satellite.cn0_dbhz = cn0;
-    satellite.tracked = has_cn0(satellite);
+    const bool is_tracked = cn0 > 0.0 && cn0 <= kMostCn0_dbhz;
+    place->second.add_signal(rank, is_tracked ? cn0 : SatelliteObservation::kUnknown);
   }
 }
 
@@ -117,7 +124,8 @@ const NmeaSky::UsedList* NmeaSky::list_of(std::size_t residual_list) const {
 }
 
 std::vector<SatelliteObservation> NmeaSky::satellites() const {
-  std::map<SatelliteId, SatelliteObservation> all = in_view_;
+  std::map<SatelliteId, SatelliteObservation> all;
+  for (const auto& [id, each] : in_view_) all.emplace(id, each.satellite);
   for (std::size_t i = 0; i < residuals_.size(); ++i) {
     const UsedList* used = list_of(i);
     if (used == nullptr) continue;

@@ -88,16 +88,16 @@ def compare_fixes(solutions, chk):
 
 
 def merged(satellites):
-    """gpsd lists each signal; the strongest counts. Direction None where it has none."""
-    result = {}
+    """gpsd lists each signal; the first counts, else the strongest of the others. Direction None where it has none."""
+    directions, signals = {}, collections.defaultdict(list)
     for each in satellites:
         if not each.get("svid"):
             continue
         key = (each["gnssid"], each["svid"])
-        direction = (each["az"], each["el"]) if "az" in each and "el" in each else None
-        strongest = max(result.get(key, (None, 0.0))[1], each.get("ss", 0.0))
-        result[key] = (direction or result.get(key, (None,))[0], strongest)
-    return result
+        if "az" in each and "el" in each:
+            directions[key] = (each["az"], each["el"])
+        signals[key].append((each.get("sigid", 0), each.get("ss", 0.0)))
+    return {key: (directions.get(key), min(each)[1] or max(cn0 for _, cn0 in each)) for key, each in signals.items()}
 
 
 def ours_as_sky(epoch):
@@ -124,7 +124,7 @@ def compare_skies(solutions, chk):
         candidates = {i: ours_as_sky(solutions[i]["satellites"]) for i in (last, last + 1)
                       if 0 <= i < len(solutions) and "satellites" in solutions[i]}
         equal = [i for i, ours in candidates.items() if sky == ours]
-        part = any(all(key in ours and ours[key][0] == direction and ours[key][1] >= cn0
+        part = any(all(key in ours and ours[key][0] == direction and cn0 in (0.0, ours[key][1])
                        for key, (direction, cn0) in sky.items()) for ours in candidates.values())
         result["equal" if equal else "part" if part else "different"] += 1
         whole.update(equal)

@@ -90,6 +90,14 @@ TEST(GpsdDecoder, PartsOfASkyArePutTogether) {
   EXPECT_EQ(output.satellites[0].satellites[1].cn0_dbhz, 35.0);
 }
 
+TEST(GpsdDecoder, OfSeveralSignalsTheFirstCounts) {
+  const ReceiverOutput output =
+      decode({tpv(0), sky(R"({"gnssid":0,"svid":1,"ss":40,"sigid":3},{"gnssid":0,"svid":1,"ss":30},)"
+                          R"({"gnssid":0,"svid":2,"ss":0},{"gnssid":0,"svid":2,"ss":25,"sigid":3})")});
+  EXPECT_EQ(output.satellites.at(0).satellites.at(0).cn0_dbhz, 30.0);
+  EXPECT_EQ(output.satellites.at(0).satellites.at(1).cn0_dbhz, 25.0);
+}
+
 TEST(GpsdDecoder, ArrivalIsTheRobotsClock) {
   GpsdDecoder decoder;
   decoder.add(tpv(0), 100s);

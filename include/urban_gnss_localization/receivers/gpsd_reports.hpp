@@ -9,6 +9,7 @@
 
 #include "urban_gnss_localization/common/stamp.hpp"
 #include "urban_gnss_localization/gnss/satellite.hpp"
+#include "urban_gnss_localization/receivers/signal_strengths.hpp"
 
 /// The reports of gpsd that have a use here, as gpsd_json(5) describes them. What a report lacks is NaN.
 namespace urban_gnss {
@@ -43,9 +44,9 @@ struct GpsdSky {
   double hdop{kGpsdUnknown}, vdop{kGpsdUnknown};
   bool has_list{false};  ///< of satellites; a report may have the dilutions only
   bool has_whole_degrees{true};
-  std::map<SatelliteId, SatelliteObservation> satellites;
+  std::map<SatelliteId, SatelliteSignals> satellites;
 
-  /// Adds another part of the same sky: newer directions, the strongest signal.
+  /// Adds another part of the same sky: newer directions, more signals.
   void merge(const GpsdSky& other);
 };
 

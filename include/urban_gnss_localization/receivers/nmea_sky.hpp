@@ -6,6 +6,7 @@
 
 #include "urban_gnss_localization/gnss/satellite_epoch.hpp"
 #include "urban_gnss_localization/receivers/nmea_sentence.hpp"
+#include "urban_gnss_localization/receivers/signal_strengths.hpp"
 
 namespace urban_gnss {
 
@@ -13,7 +14,7 @@ namespace urban_gnss {
 /// (residuals of those).
 ///
 /// A satellite that several groups of GSV list (one for each of its signals, or two talkers) is one satellite, with the
-/// direction that came last and the strongest signal's C/N0.
+/// direction that came last and the C/N0 of its first signal (signal_strengths.hpp).
 ///
 /// A GRS has no names: its residuals are of the satellites of the GSA of the same system, in their order; the second
 /// GRS of a system and signal is of its second GSA. Where neither has a system (before NMEA 4.10, talker GN), the first
@@ -50,7 +51,7 @@ class NmeaSky {
 
   const UsedList* list_of(std::size_t residual_list) const;
 
-  std::map<SatelliteId, SatelliteObservation> in_view_;
+  std::map<SatelliteId, SatelliteSignals> in_view_;
   std::vector<UsedList> used_;
   std::vector<ResidualList> residuals_;
   bool has_gsv_{false};
