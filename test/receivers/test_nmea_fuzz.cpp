@@ -57,7 +57,7 @@ void expect_sound(const ReceiverOutput& output) {
     }
     EXPECT_FALSE(std::isinf(fix.position.altitude_m));
     EXPECT_TRUE(fix.covariance.allFinite());
-    if (fix.covariance_type != CovarianceType::kUnknown) EXPECT_TRUE(is_positive_definite<3>(fix.covariance));
+    EXPECT_TRUE(fix.covariance_type == CovarianceType::kUnknown || is_positive_definite<3>(fix.covariance));
   }
   for (const RawVelocity& velocity : output.velocities) {
     EXPECT_TRUE(velocity.velocity.allFinite());
