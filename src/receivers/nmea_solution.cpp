@@ -11,7 +11,7 @@ namespace {
 
 constexpr double kMetresPerSecondOfKnot = 1852.0 / 3600.0;
 constexpr double kMostSigma_m = 100000.0;
-enum PositionRank { kGga, kGns, kGll, kRmc };  // a chart plotter was seen to send the last position in RMC
+enum PositionRank { kGga, kGns, kGll, kRmc };
 
 double number_or_nan(std::string_view field) { return to_number(field).value_or(std::nan("")); }
 
