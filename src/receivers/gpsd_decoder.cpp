@@ -101,6 +101,7 @@ void GpsdDecoder::take_sky(const GpsdSky& sky) {
 
 void GpsdDecoder::take_errors(const GpsdErrors& errors) {
   if (is_of_open(errors.time)) {
+    take_pending();
     open_->errors = errors;
   } else {
     pending_.errors = errors;

@@ -72,26 +72,25 @@ std::optional<SatelliteId> to_id(const json& satellite) {
   return SatelliteId{static_cast<Constellation>(gnssid), svid};
 }
 
+/// A satellite is listed once for each of its signals.
 void add_satellite(const json& satellite, GpsdSky& sky) {
   constexpr double kMostCn0_dbhz = 99.0;
   constexpr double kMostResidual_m = 100000.0;
   const auto id = to_id(satellite);
   if (!id) return;
-  SatelliteObservation observation;
-  observation.id = *id;
+  SatelliteSignals& each = sky.satellites[*id];
+  each.satellite.id = *id;
   const double azimuth_deg = number(satellite, "az", 0.0, 360.0);
   const double elevation_deg = number(satellite, "el", -90.0, 90.0);
-  observation.look = {azimuth_deg < 360.0 ? degrees_to_radians(azimuth_deg) : azimuth_deg - 360.0,
-                      degrees_to_radians(elevation_deg)};
+  each.satellite.look = {degrees_to_radians(azimuth_deg == 360.0 ? 0.0 : azimuth_deg),
+                         degrees_to_radians(elevation_deg)};
   for (const double angle : {azimuth_deg, elevation_deg}) {
     if (std::isfinite(angle) && angle != std::round(angle)) sky.has_whole_degrees = false;
   }
-  if (flag(satellite, "used")) observation.residual_m = number(satellite, "prRes", -kMostResidual_m, kMostResidual_m);
-  GpsdSky one;
-  one.has_whole_degrees = sky.has_whole_degrees;
-  one.satellites[*id].satellite = observation;
-  one.satellites[*id].add_signal(integer(satellite, "sigid", 0), number(satellite, "ss", 0.1, kMostCn0_dbhz));
-  sky.merge(one);  // a satellite is listed once for each of its signals
+  each.add_signal(integer(satellite, "sigid", 0), number(satellite, "ss", 0.1, kMostCn0_dbhz));
+  if (!flag(satellite, "used")) return;
+  const double residual_m = number(satellite, "prRes", -kMostResidual_m, kMostResidual_m);
+  if (std::isfinite(residual_m)) each.satellite.residual_m = residual_m;
 }
 
 GpsdSky to_sky(const json& report) {
@@ -128,14 +127,7 @@ void GpsdSky::merge(const GpsdSky& other) {
   if (std::isfinite(other.vdop)) vdop = other.vdop;
   has_list = has_list || other.has_list;
   has_whole_degrees = has_whole_degrees && other.has_whole_degrees;
-  for (const auto& [id, theirs] : other.satellites) {
-    const auto [place, is_new] = satellites.emplace(id, theirs);
-    if (is_new) continue;
-    SatelliteSignals& mine = place->second;
-    if (has_direction(theirs.satellite)) mine.satellite.look = theirs.satellite.look;
-    if (std::isfinite(theirs.satellite.residual_m)) mine.satellite.residual_m = theirs.satellite.residual_m;
-    mine.add_signals(theirs.signals);
-  }
+  for (const auto& [id, newer] : other.satellites) satellites[id] = newer;
 }
 
 std::optional<Stamp> parse_gpsd_time(std::string_view text) {

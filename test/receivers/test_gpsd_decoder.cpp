@@ -80,13 +80,26 @@ TEST(GpsdDecoder, ReportsOfOneTimeAreOneSolution) {
   EXPECT_TRUE(output.warnings.empty());
 }
 
+TEST(GpsdDecoder, AGstTellsWhoseTheSatellitesBeforeItAre) {
+  const auto gst = [](int second) {
+    return R"({"class":"GST","device":"/dev/a",)" + at(second) + R"(,"lat":3.0,"lon":2.0,"alt":5.0})";
+  };
+  const ReceiverOutput output =
+      decode({tpv(0), sky(satellite(0, 5, 40)), gst(0), tpv(1), sky(satellite(0, 5, 41)), gst(1), tpv(2)});
+  ASSERT_EQ(output.satellites.size(), 2U);
+  EXPECT_EQ(output.satellites[0].stamp, kNoon);
+  EXPECT_EQ(output.satellites[0].satellites[0].cn0_dbhz, 40.0);
+  EXPECT_EQ(output.satellites[1].stamp, kNoon + 1s);
+  EXPECT_EQ(output.fixes.at(1).covariance_type, CovarianceType::kKnown);
+}
+
 TEST(GpsdDecoder, PartsOfASkyArePutTogether) {
   const ReceiverOutput output =
       decode({tpv(0), sky(satellite(0, 5, 40)), sky(satellite(0, 5, 38) + "," + satellite(2, 7, 33)),
               sky(satellite(2, 7, 35) + "," + satellite(2, 7, 20))});
   ASSERT_EQ(output.satellites.size(), 1U);
   ASSERT_EQ(output.satellites[0].satellites.size(), 2U);
-  EXPECT_EQ(output.satellites[0].satellites[0].cn0_dbhz, 40.0);
+  EXPECT_EQ(output.satellites[0].satellites[0].cn0_dbhz, 38.0);  // the newer
   EXPECT_EQ(output.satellites[0].satellites[1].cn0_dbhz, 35.0);
 }
 

@@ -158,8 +158,10 @@ class GpsdTest(unittest.TestCase):
         same = 0
         for stamp, satellites_of_file in skies.items():
             seen = {(each.constellation, each.svid): None if math.isnan(each.cn0) else round(each.cn0, 1)
-                    for each in self.lists[stamp].satellites}
-            same += seen == {(each["gnssid"], each["svid"]): each["cn0"] for each in satellites_of_file}
+                    for each in self.lists[stamp].satellites if each.constellation != Satellite.SBAS}
+            # gpsd 3.22 takes Galileo's 33 for SBAS.
+            same += seen == {(each["gnssid"], each["svid"]): each["cn0"] for each in satellites_of_file
+                             if (each["gnssid"], each["svid"]) != (GALILEO, 33)}
         self.assertGreaterEqual(same, len(expected) - 3)  # the first ones come before gpsd knows the receiver's cycle
 
 

@@ -40,10 +40,11 @@ struct GpsdParameters {
 /// The reports of gpsd (lines of JSON, gpsd_json(5), since 3.19) in, solutions out.
 ///
 /// Reports TPV, GST and SKY with the same time are of one solution, which grows: the last TPV counts, and SKYs are put
-/// together, for gpsd sends one after each group of GSV. From NMEA a SKY has no time. It is of the solution of the next
-/// TPV, for gpsd sends that at the end of the receiver's cycle; where nothing comes for a while, of the TPV before it,
-/// if that has no satellites yet. A solution is complete when a TPV with another time comes, and at settle(), which is
-/// to be called where nothing has come for a while. Satellites that come later still have their solution's stamp.
+/// together, for gpsd sends one after each group of GSV. From NMEA a SKY has no time, and comes before or behind its
+/// TPV, by the receiver. It is of the TPV or GST that comes next, where that has a new time; where the same time, or
+/// nothing for a while, comes next, it is of the TPV before it. A solution is complete when a TPV with another time
+/// comes, and at settle(), which is to be called where nothing has come for a while. Satellites that come later still
+/// have their solution's stamp.
 ///
 /// - There is a fix with mode 2 or 3, unless gpsd says that the receiver reckons (status 5) or simulates (8). Altitude
 ///   is altHAE; unknown in mode 2.

@@ -46,7 +46,8 @@ struct GpsdSky {
   bool has_whole_degrees{true};
   std::map<SatelliteId, SatelliteSignals> satellites;
 
-  /// Adds another part of the same sky: newer directions, more signals.
+  /// Takes a newer report of the same sky. gpsd's skies grow within a receiver's cycle, so that of a satellite in both
+  /// the newer counts, and one that the newer lacks is kept.
   void merge(const GpsdSky& other);
 };
 
