@@ -11,13 +11,9 @@ namespace {
 constexpr std::size_t kMaxRecent = 100;
 constexpr double kClockSetBack_s = 1.0;
 
-bool is_finite(const GeodeticPosition& place) {
-  return std::isfinite(place.latitude_deg) && std::isfinite(place.longitude_deg) && std::isfinite(place.altitude_m);
-}
-
-/// A fix without a finite place is none; a covariance that is not finite is not declared.
+/// A fix without a finite place is none; its altitude may be unknown. A covariance that is not finite is not declared.
 void make_finite(RawFix& fix) {
-  if (!is_finite(fix.position)) {
+  if (!std::isfinite(fix.position.latitude_deg) || !std::isfinite(fix.position.longitude_deg)) {
     fix.position = {};
     fix.has_fix = false;
   }
