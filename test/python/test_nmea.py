@@ -266,6 +266,26 @@ class ReplayTest(unittest.TestCase):
         self.assertIn("nothing is of the same time", self.replay("--nmea", log, "--nmea-date", "2020-02-07"))
         self.assertIn("is no date", self.replay("--nmea", log, "--nmea-date", "07.02.2020"))
 
+    def test_a_log_without_a_bag(self):
+        done = test_tools.run("replay", "--nmea", self.write_moving_log(), "--odom", "none", "--json",
+                              self.file("alone.json"))
+        self.assertEqual(done.returncode, 0, done.stdout)
+        with open(self.file("alone.json")) as file:
+            metrics = json.load(file)
+        self.assertEqual(metrics["receiver"]["fixes"], 60)
+        self.assertGreater(metrics["estimates"], 30)
+        self.assertIn("needs a bag with odometry", test_tools.run("replay", "--nmea", self.file("drive.nmea")).stdout)
+
+    def write_moving_log(self):
+        """A minute northwards at 5 m/s."""
+        with open(self.file("drive.nmea"), "w") as log:
+            for k in range(60):
+                clock = time.strftime("%H%M%S.00", time.gmtime(40000 + k))
+                place = "%s,N,%s,E" % (angle(45.0 + 5.0 * k / METRES_A_DEGREE, 2), angle(7.0, 3))
+                log.write(sentence("GNRMC,%s,A,%s,%.3f,0.0,070220,,,A" % (clock, place, 5.0 * 3600.0 / 1852.0)))
+                log.write(sentence("GNGGA,%s,%s,1,08,1.0,300.0,M,0.0,M,," % (clock, place)))
+        return self.file("drive.nmea")
+
     def test_what_is_no_log(self):
         self.assertIn("cannot be read", self.replay("--nmea", self.file("absent.nmea")))
         self.assertIn("no sentence", self.replay("--nmea", self.bag))
