@@ -52,7 +52,9 @@ TEST(VelocityOdometry, TurnsOnTheSpotWhereTheCourseComesBackAnotherOne) {
   const auto samples = odometry_of_velocities(velocities);
   for (const OdometrySample& sample : samples) {
     const double time = to_seconds(sample.stamp);
-    if (time > 6.1 && time < 15.0) EXPECT_EQ(sample.twist.speed_mps, 0.0) << time;
+    if (time > 6.1 && time < 15.0) {
+      EXPECT_EQ(sample.twist.speed_mps, 0.0) << time;
+    }
     EXPECT_LT(std::abs(sample.twist.yaw_rate_radps), 0.5);
   }
   EXPECT_NEAR(samples.back().pose.yaw, 0.5 * kPi, 1e-6);
