@@ -38,6 +38,16 @@ inline std::vector<rosbag::MessageInstance> ordered_messages(const rosbag::Bag& 
   return messages;
 }
 
+/// What the bag has, one topic with its type a line, each after a line break.
+inline std::string topics_of(const rosbag::Bag& bag) {
+  std::string text;
+  rosbag::View all(bag);
+  for (const rosbag::ConnectionInfo* connection : all.getConnections()) {
+    text += "\n  " + connection->topic + " (" + connection->datatype + ")";
+  }
+  return text;
+}
+
 inline std::runtime_error wrong_type(const rosbag::MessageInstance& message, const std::string& expected) {
   return std::runtime_error(message.getTopic() + ": is " + message.getDataType() + ", must be " + expected);
 }

@@ -11,7 +11,9 @@
 #include "urban_gnss_localization/localizers/registry.hpp"
 #include "urban_gnss_localization/parameters/parameter_list.hpp"
 #include "urban_gnss_localization/ros/gps_bias_node_parameters.hpp"
+#include "urban_gnss_localization/ros/gpsd_node_parameters.hpp"
 #include "urban_gnss_localization/ros/occlusion_node.hpp"
+#include "urban_gnss_localization/ros/receiver_node_parameters.hpp"
 #include "urban_gnss_localization/ros/registered_localizer_node.hpp"
 #include "urban_gnss_localization/ros/waypoint_controller_node_parameters.hpp"
 
@@ -101,6 +103,10 @@ std::vector<Page> all_pages(const LocalizerRegistry& localizers) {
        ParameterList().add(OcclusionNodeSettings()));
   node("waypoint_controller", "The steering law of Nishida et al., eq. (36) to (38).",
        ParameterList().add(WaypointControllerNodeParameters()));
+  node("receiver", "Fixes, velocities and satellites from the messages of a receiver's driver (docs/receivers.md).",
+       ParameterList().add(ReceiverNodeParameters()));
+  node("gpsd", "Fixes, velocities and satellites from gpsd (docs/receivers/gpsd.md).",
+       ParameterList().add(GpsdNodeParameters()));
   pages.push_back({"docs/parameters.md", docs.str()});
   return pages;
 }

@@ -25,6 +25,8 @@ NODES = {
                        ["voxel_size = -1", "conventional, paper, soft", "did you mean model?"]),
     "simulator_node": (["_expert/target_count:=1", "_expert/interval:=0.0", "_datum:=[95.0, 0.0, 0.0]"],
                        ["target_count = 1", "interval = 0", "datum"]),
+    "gpsd_node": (["_port:=0", "_hots:=robot", "_stamps:=gps", "_expert/settle_time:=9.0"],
+                  ["port = 0", "did you mean host?", "arrival, utc", "settle_time = 9"]),
     "waypoint_controller_node": (["_speed:=fast", "_targets:=[1.0, 2.0, 3.0]"],
                                  ["speed = fast: must be a number", "targets"]),
 }

@@ -1,164 +1,48 @@
 #include "replay.hpp"
 
-#include <rosbag/bag.h>
-#include <tf2_msgs/TFMessage.h>
-
 #include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <filesystem>
 #include <iomanip>
 #include <iostream>
-#include <iterator>
-#include <map>
 #include <nlohmann/json.hpp>
 
-#include "bag_messages.hpp"
 #include "command_line.hpp"
 #include "output_file.hpp"
+#include "replay_inputs.hpp"
+#include "replay_run.hpp"
 #include "replay_settings.hpp"
 #include "urban_gnss_localization/common/progress.hpp"
 #include "urban_gnss_localization/evaluation/report_json.hpp"
 #include "urban_gnss_localization/evaluation/tum.hpp"
-#include "urban_gnss_localization/geometry/angles.hpp"
-#include "urban_gnss_localization/pipeline/bias_responder.hpp"
 #include "urban_gnss_localization/ros/conversions.hpp"
-#include "urban_gnss_localization/ros/topics.hpp"
-#include "urban_gnss_localization/ros/visibility_messages.hpp"
 
 namespace urban_gnss {
 namespace {
 
 namespace fs = std::filesystem;
-using urban_gnss_localization::SatelliteArray;
 
-/// The pipeline and the bias filter of one run, with what it writes.
-class Replay {
- public:
-  Replay(const ReplayOptions& options, const ReplaySettings& settings)
-      : shell_(settings.localizer.shell),
-        pipeline_(shell_.localization, settings.localizer.localizer->make()),
-        bias_responder_(settings.gps_bias.bias.bias) {
-    if (!options.output.empty()) {
-      const fs::path path(options.output);
-      if (path.has_parent_path()) fs::create_directories(path.parent_path());
-      bag_.open(options.output, rosbag::bagmode::Write);
-    }
-  }
+nlohmann::json to_json(const ReceiverRecording& receiver) {
+  const ReceiverCounts& counts = receiver.counts;
+  return {{"source", receiver.source},
+          {"fixes", counts.fixes},
+          {"solutions_without_fix", counts.no_fixes},
+          {"velocities", counts.velocities},
+          {"satellite_lists", counts.epochs},
+          {"fixes_with_satellites", counts.fixes_with_satellites},
+          {"fixes_with_residuals", counts.fixes_with_residuals},
+          {"unreadable_messages", receiver.unreadable}};
+}
 
-  void add_odometry(const nav_msgs::Odometry& message) {
-    newest_ = to_stamp(message.header.stamp);
-    if (!begin_) begin_ = newest_;
-    pipeline_.add_odometry(to_odometry_sample(message));
-    settle();
-  }
-  void add_fix(const sensor_msgs::NavSatFix& message) {
-    pipeline_.add_fix(to_raw_fix(message));
-    settle();
-  }
-  void add_satellites(const SatelliteArray& message) {
-    pipeline_.add_satellites(to_stamp(message.header.stamp), to_observations(message));
-    settle();
-  }
-  void add_velocity(const RawVelocity& velocity) {
-    pipeline_.add_velocity(velocity);
-    settle();
-  }
-  void add_imu(const sensor_msgs::Imu& message) {
-    if (const auto rate = to_yaw_rate(message)) pipeline_.add_imu_yaw_rate(to_stamp(message.header.stamp), *rate);
-  }
-  void set_datum(const sensor_msgs::NavSatFix& message) {
-    bag_datum_ = to_geodetic(message);
-    if (!pipeline_.frame()) pipeline_.set_datum(*bag_datum_);
-    settle();
-  }
-  void add_truth(const nav_msgs::Odometry& message) { truth_.push_back(to_timed_pose(message)); }
+void print_receiver(const ReceiverRecording& receiver) {
+  const ReceiverCounts& counts = receiver.counts;
+  std::cout << "receiver " << receiver.source << '\n'
+            << "  " << counts.fixes << " fixes (" << counts.fixes_with_satellites << " with satellites, "
+            << counts.fixes_with_residuals << " with residuals), " << counts.velocities << " velocities, "
+            << counts.no_fixes << " solutions without a fix, " << receiver.unreadable << " unreadable messages\n";
+}
 
-  void close() {
-    if (bag_.isOpen()) bag_.close();
-  }
-
-  const Trajectory& estimate() const { return estimate_; }
-  /// s from the first odometry until the first estimate, and until the heading was known to 10 degrees; NaN: never.
-  double time_to_start_s() const { return estimate_.empty() ? kNever : since_begin(estimate_.front()); }
-  double time_to_heading_s() const {
-    const auto known = std::find_if(estimate_.begin(), estimate_.end(), [](const TimedPose& each) {
-      return std::sqrt(each.covariance(2, 2)) < kKnownHeading_rad;
-    });
-    return known == estimate_.end() ? kNever : since_begin(*known);
-  }
-  const std::map<std::string, std::size_t>& decisions() const { return decisions_; }
-  const LocalizationPipeline& pipeline() const { return pipeline_; }
-
-  /// The truth in the frame of this run's datum.
-  std::optional<Trajectory> truth() const {
-    if (truth_.empty() || !pipeline_.frame()) return std::nullopt;
-    if (!bag_datum_) {
-      std::cerr << "replay: the bag has a truth but no gps/datum; the truth is taken to be in the frame of the datum\n";
-      return truth_;
-    }
-    const LocalFrame theirs(*bag_datum_);
-    Trajectory moved = truth_;
-    for (TimedPose& timed : moved) {
-      const Eigen::Vector3d point = pipeline_.frame()->to_local(theirs.to_geodetic({timed.pose.x, timed.pose.y, 0.0}));
-      timed.pose.x = point.x();
-      timed.pose.y = point.y();
-    }
-    sort_by_stamp(moved);
-    return moved;
-  }
-
- private:
-  /// Answers the pipeline's questions for the bias, as gps_bias_node does live, and writes what came of it.
-  void settle() {
-    write_biases(bias_responder_.answer(pipeline_));
-    for (const PipelineEvent& event : pipeline_.take_events()) {
-      std::cerr << "[" << std::fixed << std::setprecision(3) << to_seconds(newest_) << "] " << event.text << '\n';
-    }
-    for (const LocalizationOutput& output : pipeline_.take_outputs()) {
-      estimate_.push_back({output.stamp, output.estimate.pose, output.estimate.covariance});
-      write(topics::kEstimate, output.stamp, to_message(output, shell_.frames));
-      write(topics::kFilteredFix, output.stamp, to_fix_message(output, *pipeline_.frame(), shell_.frames));
-      tf2_msgs::TFMessage tf;
-      tf.transforms.push_back(to_map_to_odom(output, shell_.frames, shell_.transform_time_offset));
-      write("tf", output.stamp, tf);
-    }
-    write_biases(pipeline_.take_bias_estimates());
-    const std::vector<FixOutcome> outcomes = pipeline_.take_outcomes();
-    for (const FixOutcome& outcome : outcomes) ++decisions_[to_string(outcome.decision)];
-    for (const auto& status : to_status_messages(pipeline_, outcomes, to_ros(newest_), shell_.frames.map)) {
-      write(topics::kStatus, newest_, status);
-    }
-  }
-
-  void write_biases(const std::vector<BiasEstimate>& biases) {
-    for (const BiasEstimate& bias : biases) {
-      write(topics::kBias, bias.stamp, to_message(bias, shell_.frames.map));
-    }
-  }
-
-  template <class M>
-  void write(const std::string& topic, Stamp stamp, const M& message) {
-    if (bag_.isOpen()) bag_.write("/" + topic, std::max(to_ros(stamp), ros::TIME_MIN), message);
-  }
-
-  static constexpr double kNever = std::numeric_limits<double>::quiet_NaN();
-  static constexpr double kKnownHeading_rad = degrees_to_radians(10.0);
-  double since_begin(const TimedPose& pose) const { return to_seconds(pose.stamp - *begin_); }
-
-  LocalizerNodeParameters shell_;
-  LocalizationPipeline pipeline_;
-  BiasResponder bias_responder_;
-  rosbag::Bag bag_;
-  Stamp newest_{0};
-  std::optional<Stamp> begin_;  ///< of the first odometry
-  std::optional<GeodeticPosition> bag_datum_;
-  Trajectory estimate_;
-  Trajectory truth_;
-  std::map<std::string, std::size_t> decisions_;
-};
-
-void print_summary(const Replay& replay, const nlohmann::json& metrics, double wall_s, double bag_s) {
+void print_summary(const ReplayRun& replay, const nlohmann::json& metrics, double wall_s, double bag_s) {
   std::cout << replay.estimate().size() << " estimates in " << std::fixed << std::setprecision(2) << wall_s << " s ("
             << std::setprecision(0) << bag_s / std::max(wall_s, 1e-3) << " times real time)\n";
   std::cout << "fixes:";
@@ -173,80 +57,9 @@ void print_summary(const Replay& replay, const nlohmann::json& metrics, double w
             << 100.0 * metrics["errors"]["coverage"].get<double>() << " %\n";
 }
 
-/// The topics that are read, without their leading slashes.
-struct Topics {
-  explicit Topics(const ReplayOptions& options)
-      : fix(without_leading_slash(options.fix_topic)),
-        odom(without_leading_slash(options.odom_topic)),
-        imu(without_leading_slash(options.imu_topic)),
-        velocity(without_leading_slash(options.velocity_topic)),
-        satellites(without_leading_slash(options.satellites_topic)),
-        truth(without_leading_slash(options.truth_topic)) {}
-
-  /// In the order in which messages of one time are read.
-  std::vector<std::string> ordered() const { return {topics::kDatum, imu, odom, fix, velocity, satellites, truth}; }
-
-  std::string fix, odom, imu, velocity, satellites, truth;
-};
-
-using Messages = std::vector<rosbag::MessageInstance>;
-
-/// The messages of the part of the bag that was asked for, and every datum before its end: that is latched.
-Messages cut_out(const Messages& messages, const ReplayOptions& options) {
-  Messages part;
-  std::copy_if(messages.begin(), messages.end(), std::back_inserter(part), [&](const auto& message) {
-    const double into_s = (message.getTime() - messages.front().getTime()).toSec();
-    const bool is_early = into_s < options.start_s && without_leading_slash(message.getTopic()) != topics::kDatum;
-    return !is_early && into_s <= options.start_s + options.duration_s;
-  });
-  if (part.empty()) throw std::runtime_error(options.input + ": has no message after --start");
-  return part;
-}
-
-/// Throws std::runtime_error, which lists what the bag has, where a topic that is needed has no message.
-void require_topics(const rosbag::Bag& bag, const Messages& messages, const ReplayOptions& options,
-                    const Topics& names) {
-  const auto require = [&](bool is_needed, const std::string& option, const std::string& name) {
-    const auto is_of_it = [&](const auto& message) { return without_leading_slash(message.getTopic()) == name; };
-    if (!is_needed || std::any_of(messages.begin(), messages.end(), is_of_it)) return;
-    std::string present;
-    rosbag::View all(bag);
-    for (const rosbag::ConnectionInfo* connection : all.getConnections()) {
-      present += "\n  " + connection->topic + " (" + connection->datatype + ")";
-    }
-    throw std::runtime_error(options.input + " has no message on " + name + " (" + option + "); it has" + present);
-  };
-  require(true, "--fix-topic", names.fix);
-  require(true, "--odom-topic", names.odom);
-  require(options.wants_imu, "--imu-topic", names.imu);
-  require(options.wants_velocity, "--velocity-topic", names.velocity);
-  require(options.wants_satellites, "--satellites-topic", names.satellites);
-}
-
-void add_message(const rosbag::MessageInstance& message, const Topics& names, Replay& replay) {
-  const std::string name = without_leading_slash(message.getTopic());
-  if (name == names.odom) {
-    replay.add_odometry(*expect<nav_msgs::Odometry>(message));
-  } else if (name == names.fix) {
-    replay.add_fix(*expect<sensor_msgs::NavSatFix>(message));
-  } else if (name == names.velocity) {
-    const auto measured = to_raw_velocity_of(message);
-    if (!measured) throw wrong_type(message, kVelocityTypes);
-    replay.add_velocity(*measured);
-  } else if (name == names.satellites) {
-    replay.add_satellites(*expect<SatelliteArray>(message));
-  } else if (name == names.imu) {
-    replay.add_imu(*expect<sensor_msgs::Imu>(message));
-  } else if (name == names.truth) {
-    replay.add_truth(*expect<nav_msgs::Odometry>(message));
-  } else {
-    replay.set_datum(*expect<sensor_msgs::NavSatFix>(message));
-  }
-}
-
-nlohmann::json metrics_of(const ReplayOptions& options, const ReplaySettings& settings, const Replay& replay) {
+nlohmann::json metrics_of(const ReplayOptions& options, const ReplaySettings& settings, const ReplayRun& replay) {
   const LocalizationReport report = replay.pipeline().report();
-  nlohmann::json metrics = {{"bag", fs::path(options.input).filename().string()},
+  nlohmann::json metrics = {{"bag", fs::path(options.input.empty() ? options.nmea : options.input).filename().string()},
                             {"localizer", replay.pipeline().localizer().name()},
                             {"mode", replay.pipeline().localizer().mode()},
                             {"seed", settings.seed},
@@ -266,7 +79,7 @@ nlohmann::json metrics_of(const ReplayOptions& options, const ReplaySettings& se
   return metrics;
 }
 
-void write_results(const ReplayOptions& options, const nlohmann::json& metrics, const Replay& replay) {
+void write_results(const ReplayOptions& options, const nlohmann::json& metrics, const ReplayRun& replay) {
   if (!options.json_file.empty()) {
     write_file(options.json_file, [&](std::ostream& out) { out << metrics.dump(2) << '\n'; });
   }
@@ -277,29 +90,31 @@ void write_results(const ReplayOptions& options, const nlohmann::json& metrics, 
 
 void run(const ReplayOptions& options, const LocalizerRegistry& localizers) {
   const ReplaySettings settings = read_settings(options, localizers);
-  if (!fs::exists(options.input)) throw std::runtime_error(options.input + ": no such bag");
-  rosbag::Bag bag(options.input, rosbag::bagmode::Read);
-  const Topics names(options);
-  const Messages whole = ordered_messages(bag, names.ordered());
-  require_topics(bag, whole, options, names);
-  const Messages messages = cut_out(whole, options);
+  const ReplayInputs inputs(options);
 
-  Replay replay(options, settings);
-  Progress progress(messages.size(), "messages");
+  ReplayRun replay(options, settings);
+  Progress progress(inputs.all().size(), "messages");
   const auto start = std::chrono::steady_clock::now();
   std::size_t done = 0;
-  for (const rosbag::MessageInstance& message : messages) {
-    add_message(message, names, replay);
+  for (const ReplayInput& input : inputs.all()) {
+    input.give_to(replay);
     progress.report(++done);
   }
   progress.finish();
   replay.close();
   const double wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 
-  const nlohmann::json metrics = metrics_of(options, settings, replay);
+  nlohmann::json metrics = metrics_of(options, settings, replay);
+  if (options.without_odometry) metrics["odometry"] = "constant-velocity model";
+  if (inputs.receiver()) metrics["receiver"] = to_json(*inputs.receiver());
   write_results(options, metrics, replay);
-  const double bag_s = messages.empty() ? 0.0 : (messages.back().getTime() - messages.front().getTime()).toSec();
-  print_summary(replay, metrics, wall_s, bag_s);
+  print_summary(replay, metrics, wall_s, inputs.duration_s());
+  if (inputs.receiver()) print_receiver(*inputs.receiver());
+  if (options.without_odometry) {
+    std::cout << "no odometry: constant-velocity model, of the receiver's "
+              << (inputs.receiver()->counts.velocities > 0 ? "velocities" : "fixes")
+              << "; the yaw is the course over ground\n";
+  }
   if (replay.estimate().empty()) {
     throw std::runtime_error("no estimate: still waiting for " + replay.pipeline().waiting_for());
   }
@@ -318,6 +133,8 @@ int replay_main(int argc, char** argv, const LocalizerRegistry& localizers) {
   CLI::App& app = line.app();
   auto* input = app.add_option("bag", options.input, "the bag to read");
   bool only_names = false;
+  bool only_receivers = false;
+  std::string odometry = "topic";
   app.add_flag("--list-variants", only_names, "print the names under which localizers are compared, and end");
   app.add_option("--localizer", options.localizer, localizers.names() + ", or a name of --list-variants");
   app.add_option("--params", options.params, "YAML with the nodes' parameters; repeatable, later files win");
@@ -334,6 +151,18 @@ int replay_main(int argc, char** argv, const LocalizerRegistry& localizers) {
   const auto* satellites_topic = app.add_option("--satellites-topic", options.satellites_topic,
                                                 "urban_gnss_localization/SatelliteArray, whose residuals tell the "
                                                 "ranges of a fix, where the bag has it; \"\": none");
+  app.add_option("--receiver", options.receiver,
+                 "whose messages tell fix, velocity and satellites: " + receiver_preset_names() +
+                     "; navsatfix: --fix-topic and the other two");
+  app.add_flag("--list-receivers", only_receivers,
+               "print receiver, driver, topic, types and use, separated by tabs, and end");
+  app.add_option("--receiver-ns", options.receiver_ns, "namespace of the receiver's topics; default: found in the bag");
+  app.add_option("--odom", odometry,
+                 "topic: of --odom-topic; none: a constant-velocity model, of what the receiver says of its motion")
+      ->check(CLI::IsMember({"topic", "none"}));
+  app.add_option("--nmea", options.nmea,
+                 "log of NMEA 0183 in place of the bag's fixes, velocities and satellites; its stamps are UTC");
+  app.add_option("--nmea-date", options.nmea_date, "YYYY-MM-DD of its first sentence, in place of the log's own dates");
   app.add_option("--truth-topic", options.truth_topic, "nav_msgs/Odometry, for the errors only");
   app.add_option("--datum", options.datum,
                  "LAT,LON,ALT (deg, deg, m); default: the bag's gps/datum, or the first fixes")
@@ -347,10 +176,18 @@ int replay_main(int argc, char** argv, const LocalizerRegistry& localizers) {
   app.add_option("--tum", options.tum_file, "write the trajectory here (TUM format, ENU about the datum)");
   return line.run(argc, argv, [&] {
     if (only_names) return print_variants(localizers);
-    if (input->count() == 0) throw std::runtime_error("which bag? See --help");
+    if (only_receivers) {
+      std::cout << describe_receiver_presets();
+      return;
+    }
+    if (input->count() == 0 && options.nmea.empty()) throw std::runtime_error("which bag? See --help");
+    if (input->count() == 0 && odometry != "none") {
+      throw std::runtime_error("--nmea needs a bag with odometry, or --odom none");
+    }
     options.wants_velocity = velocity_topic->count() > 0 && !options.velocity_topic.empty();
     options.wants_satellites = satellites_topic->count() > 0 && !options.satellites_topic.empty();
     options.wants_imu = imu_topic->count() > 0 && !options.imu_topic.empty();
+    options.without_odometry = odometry == "none";
     run(options, localizers);
   });
 }

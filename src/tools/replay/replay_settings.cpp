@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <optional>
+#include <utility>
 
 #include "overrides.hpp"
 #include "urban_gnss_localization/parameters/parameter_list.hpp"
@@ -40,6 +41,21 @@ void assign_option(const std::string& text, Maps& maps) {
   }
 }
 
+/// Where the odometry is made of what the receiver says (odometry_of_velocities()): its errors are the velocity's, they
+/// come with every sample, and it tells neither how late the receiver is nor whether its speed is right.
+constexpr std::pair<const char*, const char*> kWithoutOdometry[] = {
+    {"position_walk", "0.5"},  {"parked_walk", "0.3"}, {"heading_walk", "0.1"},
+    {"check_wheels", "false"}, {"fix_delay", "\"0\""}, {"initialization_timeout", "10.0"},
+};
+
+void assign_without_odometry(const LocalizerNodeSettings& localizer, YAML::Node& map) {
+  for (const ListedParameter& each : ParameterList().add(localizer).parameters()) {
+    for (const auto& [name, value] : kWithoutOdometry) {
+      if (each.name == name) assign(map, each.path(Layout::kTiered) + "=" + value);
+    }
+  }
+}
+
 /// The seed of the localizer's random numbers; nothing where it draws none.
 std::optional<ListedParameter> find_seed(const LocalizerNodeSettings& localizer) {
   const std::vector<ListedParameter> all = ParameterList().add(localizer).parameters();
@@ -53,6 +69,7 @@ ReplaySettings read_settings(const ReplayOptions& options, const LocalizerRegist
   const LocalizerChoice choice = localizers.choose(options.localizer);
   ReplaySettings settings{LocalizerNodeSettings(*choice.entry), {}};
   Maps maps{choice.entry->name};
+  if (options.without_odometry) assign_without_odometry(settings.localizer, maps.of_localizer);
   for (const std::string& file : options.params) merge_file(file, localizers, maps);
   for (const std::string& text : choice.assignments) assign(maps.of_localizer, text);
   if (options.wants_imu) assign(maps.of_localizer, "expert.imu.use_imu_yaw_rate=true");

@@ -27,6 +27,11 @@ struct ReplayOptions {
   std::string satellites_topic = topics::kSatellites;
   bool wants_satellites = false;  ///< satellites_topic was asked for
   std::string truth_topic = topics::kTruth;
+  std::string receiver = "navsatfix";  ///< a name of receiver_presets()
+  std::string receiver_ns;             ///< empty: to be found
+  bool without_odometry = false;       ///< --odom none
+  std::string nmea;                    ///< a log that takes the place of the bag's fixes, velocities and satellites
+  std::string nmea_date;               ///< of its first sentence, YYYY-MM-DD; empty: its own
   std::vector<double> datum;
   double start_s = 0.0;  ///< into the bag
   double duration_s = std::numeric_limits<double>::infinity();

@@ -1,0 +1,154 @@
+#include <diagnostic_updater/diagnostic_updater.h>
+#include <geometry_msgs/TwistWithCovarianceStamped.h>
+#include <ros/ros.h>
+#include <sensor_msgs/NavSatFix.h>
+#include <urban_gnss_localization/SatelliteArray.h>
+
+#include <atomic>
+#include <mutex>
+#include <thread>
+
+#include "urban_gnss_localization/ros/conversions.hpp"
+#include "urban_gnss_localization/ros/gpsd_node_parameters.hpp"
+#include "urban_gnss_localization/ros/node_parameters.hpp"
+#include "urban_gnss_localization/ros/receiver_messages.hpp"
+#include "urban_gnss_localization/ros/tcp_lines.hpp"
+#include "urban_gnss_localization/ros/topics.hpp"
+
+namespace urban_gnss {
+namespace {
+
+/// Publishes what gpsd reports as fixes, velocities and satellites, and goes back to a gpsd that was restarted.
+class GpsdNode {
+ public:
+  GpsdNode(ros::NodeHandle& node, ros::NodeHandle& private_node)
+      : parameters_(read(private_node)), decoder_(parameters_.gpsd), diagnostics_(ros::NodeHandle(), private_node) {
+    fix_publisher_ = node.advertise<sensor_msgs::NavSatFix>(topics::kFix, 100);
+    velocity_publisher_ = node.advertise<geometry_msgs::TwistWithCovarianceStamped>(topics::kVelocity, 100);
+    satellites_publisher_ = node.advertise<urban_gnss_localization::SatelliteArray>(topics::kSatellites, 100);
+    diagnostics_.setHardwareID(server());
+    diagnostics_.add("gpsd", this, &GpsdNode::diagnose);
+    second_timer_ = node.createWallTimer(ros::WallDuration(1.0),
+                                         [this](const ros::WallTimerEvent&) { diagnostics_.force_update(); });
+    reader_ = std::thread([this] { read_until_stopped(); });
+  }
+  ~GpsdNode() {
+    is_stopped_ = true;
+    reader_.join();
+  }
+
+ private:
+  static GpsdNodeParameters read(const ros::NodeHandle& private_node) {
+    GpsdNodeParameters parameters;
+    read_private_parameters(private_node, parameters);
+    return parameters;
+  }
+  std::string server() const { return parameters_.host + ":" + std::to_string(parameters_.port); }
+
+  void read_until_stopped() {
+    while (!is_stopped_) {
+      if (!lines_.is_open() && !connect()) continue;
+      const auto line = lines_.read_line(parameters_.settle_time);
+      const std::lock_guard<std::mutex> lock(mutex_);
+      if (line) {
+        decoder_.add(*line, to_stamp(ros::Time::now()));
+      } else {
+        decoder_.settle();
+      }
+      publish(decoder_.take());
+      if (!lines_.is_open()) {
+        is_connected_ = false;
+        ROS_WARN_STREAM("gpsd at " << server() << " has ended the connection; trying again every "
+                                   << parameters_.reconnect_period << " s");
+      }
+    }
+  }
+
+  /// One attempt, and the pause after one that failed.
+  bool connect() {
+    const std::string fault = lines_.open(parameters_.host, parameters_.port);
+    if (!fault.empty()) {
+      ROS_WARN_STREAM_THROTTLE(5.0, "no gpsd at " << server() << " (" << fault << "); trying again every "
+                                                  << parameters_.reconnect_period << " s");
+      const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(parameters_.reconnect_period);
+      while (!is_stopped_ && ros::WallTime::now() < end) ros::WallDuration(0.05).sleep();
+      return false;
+    }
+    lines_.send("?WATCH={\"enable\":true,\"json\":true}\n");
+    const std::lock_guard<std::mutex> lock(mutex_);
+    decoder_.reset();
+    is_connected_ = true;
+    ++connections_;
+    ROS_INFO_STREAM("connected to gpsd at " << server());
+    return true;
+  }
+
+  void publish(const ReceiverOutput& output) {
+    for (const std::string& warning : output.warnings) ROS_WARN_STREAM(warning);
+    for (const RawFix& fix : output.fixes) {
+      fix_publisher_.publish(to_message(fix, parameters_.frame));
+      ++(fix.has_fix ? fixes_ : without_fix_);
+      last_ = ros::WallTime::now();
+    }
+    for (const RawVelocity& velocity : output.velocities) {
+      velocity_publisher_.publish(to_message(velocity, parameters_.frame));
+    }
+    for (const SatelliteEpoch& epoch : output.satellites) {
+      satellites_publisher_.publish(to_message(epoch, parameters_.frame));
+      ++lists_;
+    }
+  }
+
+  void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
+    using diagnostic_msgs::DiagnosticStatus;
+    const std::lock_guard<std::mutex> lock(mutex_);
+    constexpr double kSilence_s = 5.0;
+    if (!is_connected_) {
+      status.summary(DiagnosticStatus::ERROR, "no gpsd at " + server());
+    } else if (last_.isZero() || (ros::WallTime::now() - last_).toSec() > kSilence_s) {
+      status.summary(DiagnosticStatus::WARN, "gpsd reports no solutions: has it a device? (gpsd -n, cgps)");
+    } else if (decoder_.mode() < 2) {
+      status.summary(DiagnosticStatus::WARN, "the receiver has no fix");
+    } else if (lists_ == 0) {
+      status.summary(DiagnosticStatus::WARN, "fixes without satellites (GSV of NMEA, NAV-SAT of u-blox are off?)");
+    } else {
+      status.summary(DiagnosticStatus::OK, "fixes with satellites");
+    }
+    status.add("server", server());
+    status.add("release", decoder_.release());
+    status.add("device", decoder_.device());
+    status.add("mode", decoder_.mode());
+    status.add("connections", connections_);
+    status.add("fixes", fixes_);
+    status.add("solutions without a fix", without_fix_);
+    status.add("lists of satellites", lists_);
+  }
+
+  const GpsdNodeParameters parameters_;
+  TcpLines lines_;    ///< the reader's
+  std::mutex mutex_;  ///< of all below that the reader and diagnose() share
+  GpsdDecoder decoder_;
+  bool is_connected_{false};
+  std::size_t connections_{0};
+  std::size_t fixes_{0};
+  std::size_t without_fix_{0};
+  std::size_t lists_{0};
+  ros::WallTime last_;
+
+  ros::Publisher fix_publisher_;
+  ros::Publisher velocity_publisher_;
+  ros::Publisher satellites_publisher_;
+  diagnostic_updater::Updater diagnostics_;
+  ros::WallTimer second_timer_;
+  std::atomic<bool> is_stopped_{false};
+  std::thread reader_;
+};
+
+}  // namespace
+}  // namespace urban_gnss
+
+int main(int argc, char** argv) {
+  return urban_gnss::run_node(argc, argv, "gpsd", [](ros::NodeHandle& node, ros::NodeHandle& private_node) {
+    return std::make_shared<urban_gnss::GpsdNode>(node, private_node);
+  });
+}

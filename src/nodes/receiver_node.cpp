@@ -1,0 +1,151 @@
+// The messages of a receiver's driver in, gps/fix, gps/velocity and gps/satellites out, with one stamp a solution.
+// Parameters: ReceiverNodeParameters (docs/parameters.md); the topics of each driver are in docs/receivers.md.
+
+#include <diagnostic_updater/diagnostic_updater.h>
+#include <geometry_msgs/TwistWithCovarianceStamped.h>
+#include <ros/ros.h>
+#include <sensor_msgs/NavSatFix.h>
+#include <topic_tools/shape_shifter.h>
+#include <urban_gnss_localization/SatelliteArray.h>
+
+#include "urban_gnss_localization/receivers/receiver_input.hpp"
+#include "urban_gnss_localization/ros/conversions.hpp"
+#include "urban_gnss_localization/ros/node_parameters.hpp"
+#include "urban_gnss_localization/ros/receiver_messages.hpp"
+#include "urban_gnss_localization/ros/receiver_node_parameters.hpp"
+#include "urban_gnss_localization/ros/topics.hpp"
+
+using namespace urban_gnss;
+
+namespace {
+
+using topic_tools::ShapeShifter;
+using ShapeEvent = ros::MessageEvent<const ShapeShifter>;
+
+class ReceiverNode {
+ public:
+  ReceiverNode(ros::NodeHandle& node, ros::NodeHandle& private_node)
+      : parameters_(read(private_node)),
+        preset_(find_receiver_preset(parameters_.receiver)),
+        input_(preset_),
+        diagnostics_(ros::NodeHandle(), private_node) {
+    fix_publisher_ = node.advertise<sensor_msgs::NavSatFix>(topics::kFix, 100);
+    velocity_publisher_ = node.advertise<geometry_msgs::TwistWithCovarianceStamped>(topics::kVelocity, 100);
+    satellites_publisher_ = node.advertise<urban_gnss_localization::SatelliteArray>(topics::kSatellites, 100);
+    for (const ReceiverTopic& topic : preset_.topics) subscribe(node, topic);
+    diagnostics_.setHardwareID(preset_.driver);
+    diagnostics_.add("receiver", this, &ReceiverNode::diagnose);
+    second_timer_ = node.createWallTimer(ros::WallDuration(1.0),
+                                         [this](const ros::WallTimerEvent&) { diagnostics_.force_update(); });
+    five_second_timer_ =
+        node.createWallTimer(ros::WallDuration(5.0), [this](const ros::WallTimerEvent&) { warn_of_silence(); });
+  }
+
+ private:
+  static ReceiverNodeParameters read(const ros::NodeHandle& private_node) {
+    ReceiverNodeParameters parameters;
+    read_private_parameters(private_node, parameters);
+    return parameters;
+  }
+
+  void subscribe(ros::NodeHandle& node, const ReceiverTopic& topic) {
+    const std::string name = node.resolveName(full_name(parameters_.ns.empty() ? preset_.ns : parameters_.ns, topic));
+    const std::string fault = why_not_a_receiver(name);
+    if (!fault.empty()) throw std::runtime_error(fault);
+    const boost::function<void(const ShapeEvent&)> callback = [this, name, &topic](const ShapeEvent& event) {
+      on_message(name, topic, event);
+    };
+    subscribers_.push_back(
+        node.subscribe<ShapeShifter>(name, 1000, callback, ros::VoidConstPtr(), ros::TransportHints().tcpNoDelay()));
+  }
+
+  void on_message(const std::string& name, const ReceiverTopic& topic, const ShapeEvent& event) {
+    const ShapeShifter& message = *event.getConstMessage();
+    std::vector<std::uint8_t> bytes(message.size());
+    ros::serialization::OStream stream(bytes.data(), static_cast<std::uint32_t>(bytes.size()));
+    message.write(stream);
+    const MessageConnection connection{name, message.getDataType(), message.getMD5Sum(),
+                                       message.getMessageDefinition()};
+    input_.add(topic, connection, bytes.data(), bytes.size(), to_stamp(event.getReceiptTime()));
+    publish(input_.take());
+  }
+
+  void publish(const ReceiverOutput& output) {
+    const std::string& frame = parameters_.frame.empty() ? input_.frame_id() : parameters_.frame;
+    for (const std::string& warning : output.warnings) ROS_WARN_STREAM(warning);
+    for (const RawFix& fix : output.fixes) fix_publisher_.publish(to_message(fix, frame));
+    for (const RawVelocity& velocity : output.velocities) velocity_publisher_.publish(to_message(velocity, frame));
+    for (const SatelliteEpoch& epoch : output.satellites) satellites_publisher_.publish(to_message(epoch, frame));
+  }
+
+  std::string subscribed() const {
+    std::string names;
+    for (const ros::Subscriber& each : subscribers_) names += (names.empty() ? "" : ", ") + each.getTopic();
+    return names;
+  }
+
+  /// Topics of the driver's types that are somewhere else, for people.
+  std::string elsewhere() const {
+    ros::master::V_TopicInfo all;
+    ros::master::getTopics(all);
+    std::string names;
+    for (const ros::master::TopicInfo& info : all) {
+      for (const ReceiverTopic& topic : preset_.topics) {
+        const std::string end = std::string("/") + topic.name;
+        const bool ends_so =
+            info.name.size() >= end.size() && info.name.compare(info.name.size() - end.size(), end.size(), end) == 0;
+        if (ends_so && is_type_of(topic, info.datatype)) names += " " + info.name;
+      }
+    }
+    return names.empty() ? "" : "; there are" + names + ": receiver_ns:= says where";
+  }
+
+  void warn_of_silence() const {
+    if (!input_.received().empty()) return;
+    ROS_WARN_STREAM("no message of the receiver " << preset_.name << " on " << subscribed() << elsewhere());
+  }
+
+  void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
+    using diagnostic_msgs::DiagnosticStatus;
+    const ReceiverCounts& counts = input_.counts();
+    if (input_.received().empty()) {
+      status.summary(DiagnosticStatus::WARN, "no message on " + subscribed());
+    } else if (!input_.last_error().empty()) {
+      status.summary(DiagnosticStatus::ERROR, input_.last_error());
+    } else if (counts.fixes == 0) {
+      status.summary(DiagnosticStatus::WARN, "the receiver has no fix");
+    } else if (counts.epochs == 0) {
+      status.summary(DiagnosticStatus::OK, "fixes without satellites");
+    } else {
+      status.summary(DiagnosticStatus::OK, "fixes with satellites");
+    }
+    status.add("receiver", preset_.name);
+    status.add("fixes", counts.fixes);
+    status.add("solutions without a fix", counts.no_fixes);
+    status.add("velocities", counts.velocities);
+    status.add("lists of satellites", counts.epochs);
+    status.add("fixes with satellites", counts.fixes_with_satellites);
+    status.add("fixes with residuals", counts.fixes_with_residuals);
+    for (const auto& [topic, count] : input_.received()) status.add("messages on " + topic, count);
+    for (const auto& [topic, count] : input_.unreadable()) status.add("unreadable messages on " + topic, count);
+  }
+
+  const ReceiverNodeParameters parameters_;
+  const ReceiverPreset& preset_;
+  ReceiverInput input_;
+  ros::Publisher fix_publisher_;
+  ros::Publisher velocity_publisher_;
+  ros::Publisher satellites_publisher_;
+  std::vector<ros::Subscriber> subscribers_;
+  diagnostic_updater::Updater diagnostics_;
+  ros::WallTimer second_timer_;
+  ros::WallTimer five_second_timer_;
+};
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  return run_node(argc, argv, "receiver", [](ros::NodeHandle& node, ros::NodeHandle& private_node) {
+    return std::make_shared<ReceiverNode>(node, private_node);
+  });
+}

@@ -1,0 +1,140 @@
+#include "replay_run.hpp"
+
+#include <tf2_msgs/TFMessage.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <iomanip>
+#include <iostream>
+#include <limits>
+#include <utility>
+
+#include "urban_gnss_localization/geometry/angles.hpp"
+#include "urban_gnss_localization/ros/conversions.hpp"
+#include "urban_gnss_localization/ros/topics.hpp"
+
+namespace urban_gnss {
+namespace {
+
+constexpr double kNever = std::numeric_limits<double>::quiet_NaN();
+constexpr double kKnownHeading_rad = degrees_to_radians(10.0);
+
+}  // namespace
+
+ReplayRun::ReplayRun(const ReplayOptions& options, const ReplaySettings& settings)
+    : shell_(settings.localizer.shell),
+      pipeline_(shell_.localization, settings.localizer.localizer->make()),
+      bias_responder_(settings.gps_bias.bias.bias) {
+  if (options.output.empty()) return;
+  const std::filesystem::path path(options.output);
+  if (path.has_parent_path()) std::filesystem::create_directories(path.parent_path());
+  bag_.open(options.output, rosbag::bagmode::Write);
+}
+
+void ReplayRun::add_odometry(const OdometrySample& sample) {
+  newest_ = sample.stamp;
+  if (!begin_) begin_ = newest_;
+  pipeline_.add_odometry(sample);
+  settle();
+}
+
+void ReplayRun::add_imu(const sensor_msgs::Imu& message) {
+  if (const auto rate = to_yaw_rate(message)) pipeline_.add_imu_yaw_rate(to_stamp(message.header.stamp), *rate);
+}
+
+void ReplayRun::add_fix(const RawFix& fix) {
+  pipeline_.add_fix(fix);
+  settle();
+}
+
+void ReplayRun::add_velocity(const RawVelocity& velocity) {
+  pipeline_.add_velocity(velocity);
+  settle();
+}
+
+void ReplayRun::add_satellites(const SatelliteEpoch& epoch) {
+  pipeline_.add_satellites(epoch.stamp, epoch.satellites);
+  settle();
+}
+
+void ReplayRun::set_datum(const sensor_msgs::NavSatFix& message) {
+  bag_datum_ = to_geodetic(message);
+  if (!pipeline_.frame()) pipeline_.set_datum(*bag_datum_);
+  settle();
+}
+
+void ReplayRun::add_truth(const nav_msgs::Odometry& message) { truth_.push_back(to_timed_pose(message)); }
+
+void ReplayRun::add_receiver(const ReceiverOutput& output) {
+  for (const std::string& warning : output.warnings) std::cerr << "replay: " << warning << '\n';
+  for (const RawFix& fix : output.fixes) add_fix(fix);
+  for (const RawVelocity& velocity : output.velocities) add_velocity(velocity);
+  for (const SatelliteEpoch& epoch : output.satellites) add_satellites(epoch);
+}
+
+void ReplayRun::close() {
+  if (bag_.isOpen()) bag_.close();
+}
+
+double ReplayRun::time_to_start_s() const {
+  return estimate_.empty() ? kNever : to_seconds(estimate_.front().stamp - *begin_);
+}
+
+double ReplayRun::time_to_heading_s() const {
+  const auto known = std::find_if(estimate_.begin(), estimate_.end(), [](const TimedPose& each) {
+    return std::sqrt(each.covariance(2, 2)) < kKnownHeading_rad;
+  });
+  return known == estimate_.end() ? kNever : to_seconds(known->stamp - *begin_);
+}
+
+std::optional<Trajectory> ReplayRun::truth() const {
+  if (truth_.empty() || !pipeline_.frame()) return std::nullopt;
+  if (!bag_datum_) {
+    std::cerr << "replay: the bag has a truth but no gps/datum; the truth is taken to be in the frame of the datum\n";
+    return truth_;
+  }
+  const LocalFrame theirs(*bag_datum_);
+  Trajectory moved = truth_;
+  for (TimedPose& timed : moved) {
+    const Eigen::Vector3d point = pipeline_.frame()->to_local(theirs.to_geodetic({timed.pose.x, timed.pose.y, 0.0}));
+    timed.pose.x = point.x();
+    timed.pose.y = point.y();
+  }
+  sort_by_stamp(moved);
+  return moved;
+}
+
+void ReplayRun::settle() {
+  write_biases(bias_responder_.answer(pipeline_));
+  for (const PipelineEvent& event : pipeline_.take_events()) {
+    std::cerr << "[" << std::fixed << std::setprecision(3) << to_seconds(newest_) << "] " << event.text << '\n';
+  }
+  for (const LocalizationOutput& output : pipeline_.take_outputs()) {
+    estimate_.push_back({output.stamp, output.estimate.pose, output.estimate.covariance});
+    write(topics::kEstimate, output.stamp, to_message(output, shell_.frames));
+    write(topics::kFilteredFix, output.stamp, to_fix_message(output, *pipeline_.frame(), shell_.frames));
+    tf2_msgs::TFMessage tf;
+    tf.transforms.push_back(to_map_to_odom(output, shell_.frames, shell_.transform_time_offset));
+    write("tf", output.stamp, tf);
+  }
+  write_biases(pipeline_.take_bias_estimates());
+  const std::vector<FixOutcome> outcomes = pipeline_.take_outcomes();
+  for (const FixOutcome& outcome : outcomes) ++decisions_[to_string(outcome.decision)];
+  for (const auto& status : to_status_messages(pipeline_, outcomes, to_ros(newest_), shell_.frames.map)) {
+    write(topics::kStatus, newest_, status);
+  }
+}
+
+void ReplayRun::write_biases(const std::vector<BiasEstimate>& biases) {
+  for (const BiasEstimate& bias : biases) {
+    write(topics::kBias, bias.stamp, to_message(bias, shell_.frames.map));
+  }
+}
+
+template <class M>
+void ReplayRun::write(const std::string& topic, Stamp stamp, const M& message) {
+  if (bag_.isOpen()) bag_.write("/" + topic, std::max(to_ros(stamp), ros::TIME_MIN), message);
+}
+
+}  // namespace urban_gnss
