@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "urban_gnss_localization/receivers/receiver_presets.hpp"
 #include "urban_gnss_localization/ros/topics.hpp"
 #include "urban_gnss_localization/ros/visibility_messages.hpp"
 
@@ -22,6 +23,8 @@ LocalizerNode::LocalizerNode(ros::NodeHandle& node, ros::NodeHandle& private_nod
       pipeline_(parameters.localization, std::move(localizer)),
       on_output_(std::move(on_output)),
       diagnostics_(ros::NodeHandle(), private_node) {
+  const std::string fused = why_not_a_receiver(node.resolveName(topics::kFix));
+  if (!fused.empty()) throw std::runtime_error(std::string(topics::kFix) + ": " + fused);
   estimate_publisher_ = node.advertise<nav_msgs::Odometry>(topics::kEstimate, 100);
   fix_publisher_ = node.advertise<sensor_msgs::NavSatFix>(topics::kFilteredFix, 100);
   status_publisher_ = private_node.advertise<urban_gnss_localization::LocalizationStatus>(topics::kStatus, 100);

@@ -62,7 +62,8 @@ TEST(VelocityOdometry, TurnsOnTheSpotWhereTheCourseComesBackAnotherOne) {
 
 TEST(VelocityOdometry, NoiseAtAStandstillIsNoMotion) {
   std::vector<RawVelocity> velocities;
-  for (int t = 0; t < 20; ++t) velocities.push_back(velocity(t, 0.4 * std::cos(3.0 * t), 0.4 * std::sin(2.0 * t), 0.36));
+  for (int t = 0; t < 20; ++t)
+    velocities.push_back(velocity(t, 0.4 * std::cos(3.0 * t), 0.4 * std::sin(2.0 * t), 0.36));
   for (const OdometrySample& sample : odometry_of_velocities(velocities)) {
     EXPECT_EQ(sample.twist.speed_mps, 0.0);
     EXPECT_EQ(sample.twist.yaw_rate_radps, 0.0);

@@ -142,6 +142,8 @@ void ReplayInputs::read_topics(const ReplayOptions& options) {
   if (options.without_odometry) {
     for (const std::string& name : {names.odom, names.imu}) leave_out(name);
   }
+  const std::string fused = receiver_ ? "" : why_not_a_receiver(names.fix);
+  if (!fused.empty()) throw std::runtime_error("--fix-topic: " + fused);
   const Messages messages = ordered_messages(bag_, wanted);
   require_topics(bag_, messages, options, names, receiver_.has_value());
   for (const rosbag::MessageInstance& message : messages) {
