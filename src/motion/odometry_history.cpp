@@ -13,11 +13,12 @@ constexpr double kMaxCoordinate_m = 1e7;
 }  // namespace
 
 std::string odometry_fault(const OdometrySample& sample) {
-  if (!std::isfinite(sample.twist.speed_mps) || !std::isfinite(sample.twist.yaw_rate_radps)) {
+  if (!std::isfinite(sample.twist.speed_mps) || !std::isfinite(sample.twist.yaw_rate_radps) ||
+      !std::isfinite(sample.twist.lateral_mps)) {
     return "twist is not finite";
   }
   if (!is_finite(sample.pose)) return "pose is not finite";
-  if (std::abs(sample.twist.speed_mps) > kMaxSpeed_mps) return "speed is beyond 150 m/s";
+  if (sample.twist.ground_speed_mps() > kMaxSpeed_mps) return "speed is beyond 150 m/s";
   if (std::abs(sample.twist.yaw_rate_radps) > kMaxYawRate_radps) return "yaw rate is beyond 50 rad/s";
   if (sample.pose.position().norm() > kMaxCoordinate_m) return "pose is farther than 10 000 km from its origin";
   return {};

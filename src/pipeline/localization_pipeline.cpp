@@ -15,6 +15,8 @@ namespace {
 
 /// Standard deviation below which a heading tells forwards from backwards.
 constexpr double kKnownHeading_rad = 0.15;
+/// Share of a speed over ground by which the robot moves sideways.
+constexpr double kSideways = 0.1;
 
 /// A start at a pose that somebody has set.
 Start told(const PoseEstimate& pose, const std::string& source) {
@@ -161,6 +163,7 @@ void LocalizationPipeline::process_velocity(const RawVelocity& velocity) {
 
 void LocalizationPipeline::compare_speed(const MatchedVelocity& velocity) {
   const Eigen::Vector2d& measured = velocity.measurement.velocity;
+  const double lateral_mps = history_.twist_at(velocity.pair.stamp)->lateral_mps;
   ReceiverSpeed speed;
   speed.stamp = velocity.pair.stamp;
   speed.speed_mps = measured.norm();
@@ -169,6 +172,8 @@ void LocalizationPipeline::compare_speed(const MatchedVelocity& velocity) {
     const double turned = velocity.pair.yaw_rad - history_.pose_at(history_.latest())->yaw;
     const double yaw = localizer_->pose().yaw + turned;
     speed.forward_mps = measured.x() * std::cos(yaw) + measured.y() * std::sin(yaw);
+  } else if (std::abs(lateral_mps) > kSideways * speed.speed_mps) {
+    return;  // how much of it is forwards is not known
   }
   speed_.compare(speed, events_);
 }

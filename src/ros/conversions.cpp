@@ -91,7 +91,10 @@ OdometrySample to_odometry_sample(const nav_msgs::Odometry& message) {
   OdometrySample sample;
   sample.stamp = to_stamp(message.header.stamp);
   sample.pose = to_pose2(message.pose.pose);
-  sample.twist = {message.twist.twist.linear.x, message.twist.twist.angular.z};
+  const geometry_msgs::Twist& twist = message.twist.twist;
+  // Drivers of robots that cannot move sideways leave it as it is, or say that they do not know.
+  const double lateral_mps = std::isfinite(twist.linear.y) ? twist.linear.y : 0.0;
+  sample.twist = {twist.linear.x, twist.angular.z, lateral_mps};
   return sample;
 }
 
@@ -173,6 +176,7 @@ nav_msgs::Odometry to_message(const LocalizationOutput& output, const Frames& fr
     }
   }
   message.twist.twist.linear.x = output.twist.speed_mps;
+  message.twist.twist.linear.y = output.twist.lateral_mps;
   message.twist.twist.angular.z = output.twist.yaw_rate_radps;
   return message;
 }
