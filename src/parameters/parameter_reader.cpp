@@ -145,7 +145,18 @@ void ParameterReader::on_integer(const ParameterKey& key, int& value, const Rang
 }
 
 void ParameterReader::on_list(const ParameterKey& key, std::vector<double>& value) {
-  if (!convert(key, value, "a list of numbers")) return;
+  const YAML::Node node = find(key);
+  if (node.IsDefined() && node.IsScalar()) {
+    // A command line gives a text, _datum:="[48.1, 11.6, 520.0]", and so does a launch file.
+    try {
+      value = YAML::Load(node.Scalar()).as<std::vector<double>>();
+    } catch (const YAML::Exception&) {
+      bad_value(key, "must be a list of numbers");
+      return;
+    }
+  } else if (!convert(key, value, "a list of numbers")) {
+    return;
+  }
   if (!std::all_of(value.begin(), value.end(), [](double element) { return std::isfinite(element); })) {
     bad_value(key, "must be finite numbers");
   }

@@ -21,6 +21,7 @@
 #include "urban_gnss_localization/evaluation/tum.hpp"
 #include "urban_gnss_localization/pipeline/bias_responder.hpp"
 #include "urban_gnss_localization/ros/conversions.hpp"
+#include "urban_gnss_localization/ros/sensor_frames.hpp"
 #include "urban_gnss_localization/ros/topics.hpp"
 #include "urban_gnss_localization/ros/visibility_messages.hpp"
 
@@ -36,6 +37,7 @@ class Replay {
   Replay(const ReplayOptions& options, const ReplaySettings& settings)
       : shell_(settings.localizer.shell),
         pipeline_(shell_.localization, settings.localizer.localizer->make()),
+        sensor_frames_(shell_.frames, shell_.wants_antenna_from_tf()),
         bias_responder_(settings.gps_bias.bias.bias) {
     if (!options.output.empty()) {
       const fs::path path(options.output);
@@ -46,10 +48,13 @@ class Replay {
 
   void add_odometry(const nav_msgs::Odometry& message) {
     newest_ = to_stamp(message.header.stamp);
+    sensor_frames_.observe_odometry(message.header.frame_id, message.child_frame_id);
     pipeline_.add_odometry(to_odometry_sample(message));
     settle();
   }
   void add_fix(const sensor_msgs::NavSatFix& message) {
+    sensor_frames_.observe_fix(message.header.frame_id);
+    look_up_sensors();
     pipeline_.add_fix(to_raw_fix(message));
     settle();
   }
@@ -62,7 +67,17 @@ class Replay {
     settle();
   }
   void add_imu(const sensor_msgs::Imu& message) {
-    if (const auto rate = to_yaw_rate(message)) pipeline_.add_imu_yaw_rate(to_stamp(message.header.stamp), *rate);
+    sensor_frames_.observe_imu(message.header.frame_id);
+    look_up_sensors();
+    if (const auto sample = to_imu_sample(message)) pipeline_.add_imu(*sample);
+  }
+  /// What does not move: of the tf of a bag, only that is used.
+  void add_static_tf(const tf2_msgs::TFMessage& message) {
+    for (geometry_msgs::TransformStamped transform : message.transforms) {
+      transform.header.frame_id = without_leading_slash(transform.header.frame_id);
+      transform.child_frame_id = without_leading_slash(transform.child_frame_id);
+      tf_.setTransform(transform, "bag", true);
+    }
   }
   void set_datum(const sensor_msgs::NavSatFix& message) {
     bag_datum_ = to_geodetic(message);
@@ -98,12 +113,20 @@ class Replay {
   }
 
  private:
+  void look_up_sensors() {
+    if (!sensor_frames_.is_complete()) sensor_frames_.look_up(tf_, pipeline_);
+  }
+  void print(const std::vector<PipelineEvent>& events) const {
+    for (const PipelineEvent& event : events) {
+      std::cerr << "[" << std::fixed << std::setprecision(3) << to_seconds(newest_) << "] " << event.text << '\n';
+    }
+  }
+
   /// Answers the pipeline's questions for the bias, as gps_bias_node does live, and writes what came of it.
   void settle() {
     write_biases(bias_responder_.answer(pipeline_));
-    for (const PipelineEvent& event : pipeline_.take_events()) {
-      std::cerr << "[" << std::fixed << std::setprecision(3) << to_seconds(newest_) << "] " << event.text << '\n';
-    }
+    print(sensor_frames_.take_events());
+    print(pipeline_.take_events());
     for (const LocalizationOutput& output : pipeline_.take_outputs()) {
       estimate_.push_back({output.stamp, output.estimate.pose, output.estimate.covariance});
       write(topics::kEstimate, output.stamp, to_message(output, shell_.frames));
@@ -132,6 +155,8 @@ class Replay {
 
   LocalizerNodeParameters shell_;
   LocalizationPipeline pipeline_;
+  tf2::BufferCore tf_;
+  SensorFrames sensor_frames_;
   BiasResponder bias_responder_;
   rosbag::Bag bag_;
   Stamp newest_{0};
@@ -167,7 +192,9 @@ struct Topics {
         truth(without_leading_slash(options.truth_topic)) {}
 
   /// In the order in which messages of one time are read.
-  std::vector<std::string> ordered() const { return {topics::kDatum, imu, odom, fix, velocity, satellites, truth}; }
+  std::vector<std::string> ordered() const {
+    return {topics::kDatum, topics::kStaticTf, imu, odom, fix, velocity, satellites, truth};
+  }
 
   std::string fix, odom, imu, velocity, satellites, truth;
 };
@@ -208,6 +235,8 @@ void add_message(const rosbag::MessageInstance& message, const Topics& names, Re
     replay.add_satellites(*expect<SatelliteArray>(message));
   } else if (name == names.imu) {
     replay.add_imu(*expect<sensor_msgs::Imu>(message));
+  } else if (name == topics::kStaticTf) {
+    replay.add_static_tf(*expect<tf2_msgs::TFMessage>(message));
   } else if (name == names.truth) {
     replay.add_truth(*expect<nav_msgs::Odometry>(message));
   } else {
@@ -288,6 +317,7 @@ int replay_main(int argc, char** argv, const LocalizerRegistry& localizers) {
   bool only_names = false;
   app.add_flag("--list-variants", only_names, "print the names under which localizers are compared, and end");
   app.add_option("--localizer", options.localizer, localizers.names() + ", or a name of --list-variants");
+  app.add_option("--robot", options.robot, "differential, ackermann, holonomic or car: what is known of its wheels");
   app.add_option("--params", options.params, "YAML with the nodes' parameters; repeatable, later files win");
   line.add_set("--set", options.overrides, "a parameter of the localizer, or after gps_bias. of the bias filter");
   app.add_option("--output", options.output, "bag to write: odometry/filtered, gps/bias, status, tf");
