@@ -57,4 +57,12 @@ GeodeticPosition LocalFrame::to_geodetic(const Eigen::Vector3d& enu) const {
   return is_finite ? position : GeodeticPosition{kNaN, kNaN, kNaN};
 }
 
+double LocalFrame::convergence_rad(const GeodeticPosition& position) const {
+  double x, y, z;
+  std::vector<double> rotation(9);  // of east, north, up at the place into the frame, row by row
+  converter_.Forward(position.latitude_deg, position.longitude_deg, position.altitude_m, x, y, z, rotation);
+  const double angle = std::atan2(rotation[3], rotation[0]);
+  return std::isfinite(angle) ? angle : 0.0;
+}
+
 }  // namespace urban_gnss

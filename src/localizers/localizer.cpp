@@ -17,8 +17,8 @@ bool is_usable(const VelocityMeasurement& velocity) {
 }
 
 bool is_usable(const Twist2& twist, double duration_s) {
-  return std::isfinite(twist.speed_mps) && std::isfinite(twist.yaw_rate_radps) && std::isfinite(duration_s) &&
-         duration_s > 0.0;
+  return std::isfinite(twist.speed_mps) && std::isfinite(twist.yaw_rate_radps) && std::isfinite(twist.lateral_mps) &&
+         std::isfinite(duration_s) && duration_s > 0.0;
 }
 
 }  // namespace urban_gnss

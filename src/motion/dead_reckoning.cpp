@@ -11,8 +11,10 @@ double square(double value) { return value * value; }
 
 /// Moves at the corrected twist and fills pose and transition; returns how a distance (m) and a turn (rad) show in the
 /// pose, as columns.
-Eigen::Matrix<double, 3, 2> linearise(const Pose2& pose, const OdometryErrors& errors, const Twist2& measured,
-                                      double duration_s, DeadReckoningStep& step) {
+Eigen::Matrix<double, 3, 2> linearise(const Pose2& pose, const OdometryErrors& errors, const MotionStep& motion,
+                                      DeadReckoningStep& step) {
+  const Twist2& measured = motion.twist;
+  const double duration_s = motion.duration_s;
   const Twist2 twist = corrected(measured, errors);
   step.pose = move(pose, twist, duration_s);
   const double dx = step.pose.x - pose.x;
@@ -21,10 +23,12 @@ Eigen::Matrix<double, 3, 2> linearise(const Pose2& pose, const OdometryErrors& e
   step.transition(0, 2) = -dy;
   step.transition(1, 2) = dx;
   // Of a distance, along the chord; of a turn, half of it shows in the chord's direction.
-  const double chord_yaw = pose.yaw + 0.5 * twist.yaw_rate_radps * duration_s;
+  const Pose2 chord{0.0, 0.0, pose.yaw + 0.5 * twist.yaw_rate_radps * duration_s};
+  const Eigen::Vector2d along = transform_point(chord, motion.direction);
   Eigen::Matrix<double, 3, 2> k;
-  k << std::cos(chord_yaw), -0.5 * dy, std::sin(chord_yaw), 0.5 * dx, 0.0, 1.0;
-  step.transition.block<3, 1>(0, 3) = k.col(0) * measured.speed_mps * duration_s;
+  k << along.x(), -0.5 * dy, along.y(), 0.5 * dx, 0.0, 1.0;
+  const Eigen::Vector2d velocity = transform_point(chord, {measured.speed_mps, measured.lateral_mps});
+  step.transition.block<3, 1>(0, 3) << velocity * duration_s, 0.0;
   step.transition.block<3, 1>(0, 4) = k.col(1) * duration_s;
   step.yaw_rate_scale = k.col(1) * measured.yaw_rate_radps * duration_s;
   return k;
@@ -44,7 +48,7 @@ DeadReckoningStep dead_reckon(const Pose2& pose, const OdometryErrors& errors, c
     step.noise(0, 0) = step.noise(1, 1) = square(p.parked_walk) * dt;
     return step;
   }
-  const auto k = linearise(pose, errors, motion.twist, dt, step);
+  const auto k = linearise(pose, errors, motion, step);
   // Of the noise of speed and second input, the distance (m) and the turn (rad); the disturbance turns afterwards.
   Eigen::Matrix2d by_input;
   if (motion.model == MotionModel::kBicycle) {

@@ -12,14 +12,22 @@ constexpr double kMaxCoordinate_m = 1e7;
 
 }  // namespace
 
+bool is_plausible(const Twist2& twist) {
+  return twist.ground_speed_mps() <= kMaxSpeed_mps && std::abs(twist.yaw_rate_radps) <= kMaxYawRate_radps;
+}
+
 std::string odometry_fault(const OdometrySample& sample) {
-  if (!std::isfinite(sample.twist.speed_mps) || !std::isfinite(sample.twist.yaw_rate_radps)) {
+  if (!sample.has_pose && !sample.has_twist) return "neither a pose (its quaternion is 0) nor a twist (covariance -1)";
+  const Twist2& twist = sample.twist;
+  if (!std::isfinite(twist.speed_mps) || !std::isfinite(twist.yaw_rate_radps) || !std::isfinite(twist.lateral_mps)) {
     return "twist is not finite";
   }
-  if (!is_finite(sample.pose)) return "pose is not finite";
-  if (std::abs(sample.twist.speed_mps) > kMaxSpeed_mps) return "speed is beyond 150 m/s";
-  if (std::abs(sample.twist.yaw_rate_radps) > kMaxYawRate_radps) return "yaw rate is beyond 50 rad/s";
-  if (sample.pose.position().norm() > kMaxCoordinate_m) return "pose is farther than 10 000 km from its origin";
+  if (sample.has_pose && !is_finite(sample.pose)) return "pose is not finite";
+  if (sample.has_twist && twist.ground_speed_mps() > kMaxSpeed_mps) return "speed is beyond 150 m/s";
+  if (sample.has_twist && std::abs(twist.yaw_rate_radps) > kMaxYawRate_radps) return "yaw rate is beyond 50 rad/s";
+  if (sample.has_pose && sample.pose.position().norm() > kMaxCoordinate_m) {
+    return "pose is farther than 10 000 km from its origin";
+  }
   return {};
 }
 

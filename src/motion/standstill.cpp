@@ -5,11 +5,11 @@
 namespace urban_gnss {
 
 bool is_standstill(const Twist2& twist, double yaw_rate_limit_radps) {
-  return std::abs(twist.speed_mps) < kStandstill_mps && std::abs(twist.yaw_rate_radps) < yaw_rate_limit_radps;
+  return twist.ground_speed_mps() < kStandstill_mps && std::abs(twist.yaw_rate_radps) < yaw_rate_limit_radps;
 }
 
 void Travel::add(const Twist2& twist, double step_s) {
-  distance_m += std::abs(twist.speed_mps) * step_s;
+  distance_m += twist.ground_speed_mps() * step_s;
   duration_s += step_s;
 }
 

@@ -162,7 +162,17 @@ void ParameterReader::on_integer(const ParameterKey& key, int& value, const Rang
 }
 
 void ParameterReader::on_list(const ParameterKey& key, std::vector<double>& value) {
-  if (const auto flat = flattened(find(key))) {
+  YAML::Node node = find(key);
+  if (node.IsDefined() && node.IsScalar()) {
+    // A command line gives a text, _datum:="[48.1, 11.6, 520.0]", and so does a launch file.
+    try {
+      node = YAML::Load(node.Scalar());
+      value = node.as<std::vector<double>>();
+    } catch (const YAML::Exception&) {
+      if (!flattened(node)) return bad_value(key, "must be a list of numbers");
+      value = *flattened(node);
+    }
+  } else if (const auto flat = flattened(node)) {
     value = *flat;
   } else if (!convert(key, value, "a list of numbers")) {
     return;

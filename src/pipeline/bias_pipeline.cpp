@@ -18,6 +18,7 @@ void BiasPipeline::reset(const std::string& why) {
   if (!why.empty()) events_.push_back({PipelineEvent::Level::kWarn, "reset: " + why});
   tracker_.reset();
   clocks_.reset();
+  odometry_.reset();
   history_.clear();
   poses_.clear();
   fixes_.reset();
@@ -34,9 +35,11 @@ bool BiasPipeline::is_new(InputStream stream, Stamp stamp) {
   return clocks_.accept(stream, stamp, [this](const std::string& why) { reset(why); });
 }
 
-void BiasPipeline::add_odometry(const OdometrySample& sample) {
-  if (!odometry_fault(sample).empty()) return;
-  if (!is_new(InputStream::kOdometry, sample.stamp)) return;
+void BiasPipeline::add_odometry(const OdometrySample& told) {
+  if (!OdometrySource::fault_of(told).empty()) return;
+  if (!is_new(InputStream::kOdometry, told.stamp)) return;
+  std::vector<PipelineEvent> said_by_the_localizer;
+  const OdometrySample sample = odometry_.resolve(told, said_by_the_localizer);
   const double odometry_gap = parameters_.input.stamps.odometry_gap;
   if (!history_.empty() && to_seconds(sample.stamp - history_.latest()) > odometry_gap) {
     // The localizer starts anew after such a gap, and what the fix is compared with is another estimate.

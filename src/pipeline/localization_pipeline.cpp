@@ -6,26 +6,11 @@
 
 #include "limits.hpp"
 #include "text.hpp"
+#include "told_start.hpp"
 
 namespace urban_gnss {
 
 using Level = PipelineEvent::Level;
-
-namespace {
-
-/// Standard deviation below which a heading tells forwards from backwards.
-constexpr double kKnownHeading_rad = 0.15;
-
-/// A start at a pose that somebody has set.
-Start told(const PoseEstimate& pose, const std::string& source) {
-  Start start;
-  start.estimate = pose;
-  start.source = source;
-  start.is_told = true;
-  return start;
-}
-
-}  // namespace
 
 Pose2 map_to_odometry(const LocalizationOutput& output) {
   return compose(output.estimate.pose, inverse(output.odometry_pose));
@@ -55,8 +40,13 @@ LocalizationPipeline::LocalizationPipeline(const LocalizationParameters& paramet
 void LocalizationPipeline::reset(const std::string& why) {
   if (!why.empty()) event(Level::kWarn, "reset: " + why);
   datum_.reset();
+  place_.reset();
   history_.clear();
   ++epoch_;
+  offsets_.reset();
+  said_far_imu_ = false;
+  odometry_.reset();
+  imu_.reset();
   yaw_rate_.reset();
   speed_.reset();
   velocities_.reset();
@@ -82,104 +72,13 @@ void LocalizationPipeline::note_unset_stamp(InputStream stream, Stamp stamp) {
   event(Level::kWarn, std::string("header.stamp of ") + to_string(stream) + " is 0: its driver must set it");
 }
 
+std::string LocalizationPipeline::far_ahead(Stamp stamp) const {
+  return "more than " + seconds_text(kMaxAhead_s) + " ahead of the odometry" +
+         clock_hint(to_seconds(stamp - history_.latest()));
+}
+
 bool LocalizationPipeline::is_far_ahead(Stamp stamp) const {
   return !history_.empty() && to_seconds(stamp - history_.latest()) > kMaxAhead_s;
-}
-
-void LocalizationPipeline::add_odometry(const OdometrySample& sample) {
-  const std::string fault = odometry_fault(sample);
-  if (!fault.empty()) {
-    event(Level::kWarn, "odometry left out: " + fault);
-    return;
-  }
-  if (!is_new(InputStream::kOdometry, sample.stamp)) return;
-
-  const Stamp since = history_.empty() ? sample.stamp : history_.latest();
-  const double elapsed_s = to_seconds(sample.stamp - since);
-  Twist2 twist = yaw_rate_.twist_of(sample, since, events_);
-  speed_.set_wheels_contradicted(yaw_rate_.contradicts_wheels());
-  twist.speed_mps = speed_.speed_of(twist.speed_mps, sample.stamp, elapsed_s, events_);
-  if (elapsed_s > parameters_.input.stamps.odometry_gap) forget_odometry(elapsed_s);
-  history_.add(sample.stamp, twist);
-  if (initialized() && elapsed_s > 0.0) {
-    localizer_->move(twist, elapsed_s);
-    const MotionDoubt doubt{speed_.doubt_m2(), yaw_rate_.doubt_rad2()};
-    if (doubt.exists()) localizer_->doubt(doubt);
-    guard_against_non_finite();
-  }
-  if (!initialized() && start_.given() && frame()) start_from(told(*start_.given(), "the given pose"));
-  process_velocities();
-  process_fixes();
-  if (initialized()) outputs_.push_back({sample.stamp, estimate(), sample.pose, twist});
-}
-
-void LocalizationPipeline::forget_odometry(double gap_s) {
-  event(Level::kWarn, "no odometry for " + seconds_text(gap_s) +
-                          (initialized() ? ": place unknown, starting anew from the fixes" : ""));
-  history_.clear();
-  delay_.forget_odometry();
-  ++epoch_;
-  start_.lose_place();
-}
-
-void LocalizationPipeline::add_imu_yaw_rate(Stamp stamp, double yaw_rate_radps) {
-  if (!parameters_.imu.use_imu_yaw_rate || !is_usable_yaw_rate(yaw_rate_radps)) return;
-  if (is_far_ahead(stamp)) {
-    event(Level::kWarn,
-          "yaw rate of the IMU left out: more than " + seconds_text(kMaxAhead_s) + " ahead of the odometry");
-    return;
-  }
-  if (is_new(InputStream::kImu, stamp)) yaw_rate_.add(stamp, yaw_rate_radps);
-}
-
-void LocalizationPipeline::add_velocity(const RawVelocity& velocity) {
-  if (!takes_velocity()) return;
-  std::string fault = velocity_fault(velocity);
-  if (fault.empty() && is_far_ahead(velocity.stamp)) {
-    fault = "more than " + seconds_text(kMaxAhead_s) + " ahead of the odometry";
-  }
-  if (fault.empty() && !is_new(InputStream::kVelocities, velocity.stamp)) fault = "not newer than the last";
-  if (!fault.empty()) {
-    event(Level::kWarn, "velocity of the receiver left out: " + fault);
-    return;
-  }
-  velocities_.add(velocity);
-  process_velocities();
-}
-
-void LocalizationPipeline::process_velocities() {
-  if (history_.empty()) return;
-  while (const auto velocity = velocities_.take(history_.latest())) process_velocity(*velocity);
-}
-
-void LocalizationPipeline::process_velocity(const RawVelocity& velocity) {
-  RawVelocity in_time = velocity;
-  in_time.stamp = undelayed(velocity.stamp);
-  const auto matched = match_velocity(in_time, history_, antenna_);
-  if (!matched) {
-    event(Level::kWarn, "velocity of the receiver left out: older than the odometry that is remembered");
-    return;
-  }
-  start_.add_velocity(matched->pair);
-  compare_speed(*matched);
-  if (!initialized() || !localizer_->takes_velocity()) return;
-  localizer_->correct_velocity(matched->measurement);
-  reporter_.count_velocity();
-  guard_against_non_finite();
-}
-
-void LocalizationPipeline::compare_speed(const MatchedVelocity& velocity) {
-  const Eigen::Vector2d& measured = velocity.measurement.velocity;
-  ReceiverSpeed speed;
-  speed.stamp = velocity.pair.stamp;
-  speed.speed_mps = measured.norm();
-  speed.sigma_mps = std::sqrt(0.5 * velocity.measurement.covariance.trace());
-  if (initialized() && localizer_->health().heading_sigma_rad < kKnownHeading_rad) {
-    const double turned = velocity.pair.yaw_rad - history_.pose_at(history_.latest())->yaw;
-    const double yaw = localizer_->pose().yaw + turned;
-    speed.forward_mps = measured.x() * std::cos(yaw) + measured.y() * std::sin(yaw);
-  }
-  speed_.compare(speed, events_);
 }
 
 void LocalizationPipeline::add_satellites(Stamp stamp, std::vector<SatelliteObservation> satellites) {
@@ -217,15 +116,17 @@ std::optional<BiasQuery> LocalizationPipeline::bias_query() const {
 }
 
 void LocalizationPipeline::add_fix(const RawFix& fix) {
+  if (fix.has_fix) offsets_.add(InputStream::kFixes, fix.stamp);
   if (is_far_ahead(fix.stamp)) {
     FixOutcome outcome;
     outcome.stamp = fix.stamp;
-    decide_stale(std::move(outcome), "more than " + seconds_text(kMaxAhead_s) + " ahead of the odometry");
+    decide_stale(std::move(outcome), far_ahead(fix.stamp));
     return;
   }
   // A receiver that does not know where it is may not know the time either, and a stamp that was not set is no time.
   // What is not new, the queue rejects.
   if (is_usable_position(fix) && fix.stamp != Stamp::zero()) is_new(InputStream::kFixes, fix.stamp);
+  if (is_usable_position(fix)) place_ = fix.position;
   const auto rejected = fixes_.add(fix);
   for (PipelineEvent& mistake : fixes_.take_events()) events_.push_back(std::move(mistake));
   if (rejected) {
@@ -259,8 +160,10 @@ bool LocalizationPipeline::process_next_fix() {
   if (speed_.is_wrong()) delay_.forget_odometry();
   delay_.add(fix.fix.stamp, fix.fix.position, history_, antenna_);
   if (const auto news = delay_.take_news()) event(Level::kInfo, *news);
+  odometry_.add_fix(undelayed(fix.fix.stamp), fix.fix.position, events_);
   if (is_too_old) {
-    decide_stale(fix.outcome, "older than the odometry that is remembered");
+    const double behind_s = to_seconds(history_.latest() - undelayed(fix.fix.stamp));
+    decide_stale(fix.outcome, "older than the odometry that is remembered" + clock_hint(-behind_s));
     return true;
   }
   if (!initialized()) {
@@ -321,7 +224,10 @@ void LocalizationPipeline::correct_with(const ValidatedFix& fix) {
   measurement.time_s = to_seconds(stamp);
   measurement.stamp = stamp;
   const SatelliteEpoch* epoch = satellites_.take(stamp);
-  if (epoch != nullptr && localizer_->takes_satellites()) measurement.satellites = epoch->satellites;
+  if (epoch != nullptr && localizer_->takes_satellites()) {
+    measurement.satellites = epoch->satellites;
+    for (SatelliteObservation& each : measurement.satellites) each.look.azimuth_rad -= convergence_rad();
+  }
 
   const bool is_spoilt = epoch != nullptr && residual_rms_m(epoch->satellites) > parameters_.integrity.residual_limit;
   if (!is_spoilt) watch_integrity(fix, measurement.antenna_in_body);
@@ -442,8 +348,10 @@ LocalizationReport LocalizationPipeline::report() const {
 std::string LocalizationPipeline::complaint() const {
   if (integrity_.contradiction()) return describe(*integrity_.contradiction());
   if (integrity_.is_unconfirmed()) return "no fix has confirmed the pose that was set";
-  const std::string speed = speed_.complaint();
-  return speed.empty() ? yaw_rate_.complaint() : speed;
+  for (const std::string& each : {odometry_.complaint(), speed_.complaint()}) {
+    if (!each.empty()) return each;
+  }
+  return yaw_rate_.complaint();
 }
 
 std::string LocalizationPipeline::waiting_for() const {
@@ -451,7 +359,8 @@ std::string LocalizationPipeline::waiting_for() const {
   if (history_.empty()) return "odometry";
   const std::string rejected = reporter_.last_rejection();
   if (!frame()) return "the datum: " + datum_.waiting_for() + rejected;
-  if (!fixes_.last_stamp()) return "a usable fix" + rejected;
+  const std::string offset = offsets_.describe(InputStream::kFixes);
+  if (!fixes_.last_stamp()) return "a usable fix" + (offset.empty() ? rejected : ": " + offset);
   return "the start: " + start_.waiting_for() + rejected;
 }
 

@@ -22,7 +22,7 @@ std::optional<MatchedVelocity> match_velocity(const RawVelocity& velocity, const
   if (!then) return std::nullopt;
   const Twist2 twist = *history.twist_at(velocity.stamp);
   const Eigen::Vector2d in_base(twist.speed_mps - twist.yaw_rate_radps * antenna.y(),
-                                twist.yaw_rate_radps * antenna.x());
+                                twist.lateral_mps + twist.yaw_rate_radps * antenna.x());
   const Pose2 turn{0.0, 0.0, then->yaw};
   const Pose2 turn_since{0.0, 0.0, then->yaw - history.pose_at(history.latest())->yaw};
   MatchedVelocity matched;

@@ -91,8 +91,15 @@ GeodeticPosition to_geodetic(const sensor_msgs::NavSatFix& message) {
 OdometrySample to_odometry_sample(const nav_msgs::Odometry& message) {
   OdometrySample sample;
   sample.stamp = to_stamp(message.header.stamp);
-  sample.pose = to_pose2(message.pose.pose);
-  sample.twist = {message.twist.twist.linear.x, message.twist.twist.angular.z};
+  const geometry_msgs::Quaternion& q = message.pose.pose.orientation;
+  sample.has_pose = q.x != 0.0 || q.y != 0.0 || q.z != 0.0 || q.w != 0.0;
+  if (sample.has_pose) sample.pose = to_pose2(message.pose.pose);
+  // Of Imu.msg, and of drivers that follow it: -1 in the first element says that there is no measurement.
+  sample.has_twist = message.twist.covariance[0] != -1.0;
+  const geometry_msgs::Twist& twist = message.twist.twist;
+  // Drivers of robots that cannot move sideways leave it as it is, or say that they do not know.
+  const double lateral_mps = std::isfinite(twist.linear.y) ? twist.linear.y : 0.0;
+  if (sample.has_twist) sample.twist = {twist.linear.x, twist.angular.z, lateral_mps};
   return sample;
 }
 
@@ -117,14 +124,23 @@ RawVelocity to_raw_velocity(const geometry_msgs::TwistWithCovarianceStamped& mes
   return velocity;
 }
 
-std::optional<double> to_yaw_rate(const sensor_msgs::Imu& message) {
+std::optional<ImuSample> to_imu_sample(const sensor_msgs::Imu& message) {
   if (message.angular_velocity_covariance[0] == -1.0) return std::nullopt;
-  const Eigen::Vector3d rate(message.angular_velocity.x, message.angular_velocity.y, message.angular_velocity.z);
-  if (!rate.allFinite()) return std::nullopt;
+  ImuSample sample;
+  sample.stamp = to_stamp(message.header.stamp);
+  sample.rate_radps << message.angular_velocity.x, message.angular_velocity.y, message.angular_velocity.z;
+  if (!sample.rate_radps.allFinite()) return std::nullopt;
+  const Eigen::Vector3d acceleration(message.linear_acceleration.x, message.linear_acceleration.y,
+                                     message.linear_acceleration.z);
+  if (message.linear_acceleration_covariance[0] != -1.0 && acceleration.allFinite()) {
+    sample.acceleration_mps2 = acceleration;
+  }
   const Eigen::Quaterniond orientation(message.orientation.w, message.orientation.x, message.orientation.y,
                                        message.orientation.z);
-  const bool is_oriented = message.orientation_covariance[0] != -1.0 && std::abs(orientation.norm() - 1.0) < 0.1;
-  return is_oriented ? (orientation.normalized() * rate).z() : rate.z();
+  if (message.orientation_covariance[0] != -1.0 && std::abs(orientation.norm() - 1.0) < 0.1) {
+    sample.orientation = orientation.normalized();
+  }
+  return sample;
 }
 
 Pose2 to_pose2(const geometry_msgs::Pose& pose) { return {pose.position.x, pose.position.y, yaw_of(pose.orientation)}; }
@@ -174,6 +190,7 @@ nav_msgs::Odometry to_message(const LocalizationOutput& output, const Frames& fr
     }
   }
   message.twist.twist.linear.x = output.twist.speed_mps;
+  message.twist.twist.linear.y = output.twist.lateral_mps;
   message.twist.twist.angular.z = output.twist.yaw_rate_radps;
   return message;
 }

@@ -1,7 +1,5 @@
 #include "urban_gnss_localization/ros/localizer_node.hpp"
 
-#include <tf2/exceptions.h>
-
 #include <cmath>
 #include <utility>
 
@@ -22,6 +20,7 @@ LocalizerNode::LocalizerNode(ros::NodeHandle& node, ros::NodeHandle& private_nod
     : parameters_(parameters),
       pipeline_(parameters.localization, std::move(localizer)),
       on_output_(std::move(on_output)),
+      sensor_frames_(parameters.frames, parameters.wants_antenna_from_tf()),
       diagnostics_(ros::NodeHandle(), private_node) {
   const std::string fused = why_not_a_receiver(node.resolveName(topics::kFix));
   if (!fused.empty()) throw std::runtime_error(std::string(topics::kFix) + ": " + fused);
@@ -58,8 +57,7 @@ LocalizerNode::LocalizerNode(ros::NodeHandle& node, ros::NodeHandle& private_nod
       node.advertiseService("fromLLArray", &Self::convert<FromLLArray::Request, FromLLArray::Response>, this));
   services_.push_back(private_node.advertiseService("reset", &Self::reset, this));
 
-  antenna_known_ = !parameters_.antenna_offset_from_tf || parameters_.localization.input.antenna().norm() > 0.0;
-  if (!antenna_known_) tf_listener_ = std::make_unique<tf2_ros::TransformListener>(tf_buffer_);
+  tf_listener_ = std::make_unique<tf2_ros::TransformListener>(tf_buffer_);
 
   diagnostics_.setHardwareID("none");
   diagnostics_.add("localization", this, &Self::diagnose);
@@ -71,6 +69,7 @@ LocalizerNode::LocalizerNode(ros::NodeHandle& node, ros::NodeHandle& private_nod
 
 void LocalizerNode::on_odometry(const nav_msgs::Odometry& message) {
   odometry_watch_.observe_frame(message.header.frame_id);
+  sensor_frames_.observe_odometry(message.header.frame_id, message.child_frame_id);
   newest_input_ = to_stamp(message.header.stamp);
   pipeline_.add_odometry(to_odometry_sample(message));
   publish_results();
@@ -78,6 +77,8 @@ void LocalizerNode::on_odometry(const nav_msgs::Odometry& message) {
 
 void LocalizerNode::on_fix(const sensor_msgs::NavSatFix& message) {
   fix_watch_.observe_frame(message.header.frame_id);
+  sensor_frames_.observe_fix(message.header.frame_id);
+  look_up_sensors();
   pipeline_.add_fix(to_raw_fix(message));
   publish_results();
 }
@@ -99,7 +100,9 @@ void LocalizerNode::on_satellites(const urban_gnss_localization::SatelliteArray&
 }
 
 void LocalizerNode::on_imu(const sensor_msgs::Imu& message) {
-  if (const auto rate = to_yaw_rate(message)) pipeline_.add_imu_yaw_rate(to_stamp(message.header.stamp), *rate);
+  sensor_frames_.observe_imu(message.header.frame_id);
+  look_up_sensors();
+  if (const auto sample = to_imu_sample(message)) pipeline_.add_imu(*sample);
 }
 
 void LocalizerNode::on_bias(const urban_gnss_localization::GpsBias& message) {
@@ -112,7 +115,8 @@ void LocalizerNode::on_bias(const urban_gnss_localization::GpsBias& message) {
 }
 
 std::string LocalizerNode::try_pose(const geometry_msgs::PoseWithCovarianceStamped& message) {
-  if (!message.header.frame_id.empty() && message.header.frame_id != parameters_.frames.map) {
+  const std::string frame = without_leading_slash(message.header.frame_id);
+  if (!frame.empty() && frame != parameters_.frames.map) {
     return "pose is in frame '" + message.header.frame_id + "', must be in '" + parameters_.frames.map + "'";
   }
   try {
@@ -213,30 +217,14 @@ void LocalizerNode::publish_status() {
       to_message(pipeline_.report(), pipeline_.localizer(), to_ros(newest_input_), parameters_.frames.map));
 }
 
-void LocalizerNode::look_up_antenna() {
-  if (antenna_known_ || fix_watch_.frame().empty()) return;
-  if (fix_watch_.frame() == parameters_.frames.base_link) {
-    antenna_known_ = true;
-    return;
-  }
-  try {
-    const auto transform = tf_buffer_.lookupTransform(parameters_.frames.base_link, fix_watch_.frame(), ros::Time(0));
-    const auto& offset = transform.transform.translation;
-    pipeline_.set_antenna_offset({offset.x, offset.y});
-    ROS_INFO_STREAM("antenna at x " << offset.x << " m, y " << offset.y << " m in " << parameters_.frames.base_link);
-    antenna_known_ = true;
-  } catch (const tf2::TransformException&) {
-    if (!antenna_warned_) {
-      ROS_WARN_STREAM("no tf from " << parameters_.frames.base_link << " to the fix's frame " << fix_watch_.frame()
-                                    << ": the antenna is taken to be at the base until there is one");
-    }
-    antenna_warned_ = true;
-  }
+void LocalizerNode::look_up_sensors() {
+  if (tf_listener_ && !sensor_frames_.is_complete()) sensor_frames_.look_up(tf_buffer_, pipeline_);
+  log_.log(sensor_frames_.take_events());
 }
 
 void LocalizerNode::every_second() {
-  look_up_antenna();
-  if (antenna_known_) tf_listener_.reset();
+  look_up_sensors();
+  sensor_frames_.complain();
   publish_status();
   diagnostics_.force_update();
 }

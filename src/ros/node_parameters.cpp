@@ -2,6 +2,8 @@
 
 #include <ros/ros.h>
 
+#include "urban_gnss_localization/parameters/params_file.hpp"
+
 namespace urban_gnss {
 namespace {
 
@@ -36,11 +38,23 @@ YAML::Node private_parameters(const ros::NodeHandle& private_node) {
 ParameterReader private_parameter_reader(const ros::NodeHandle& private_node) {
   ParameterReader reader(private_parameters(private_node), "", "", Layout::kTiered);
   reader.ignore("diagnostic_period");  // diagnostic_updater's own
+  reader.ignore("params_file");        // finish_reading() looks through it
   return reader;
 }
 
 void finish_reading(const ros::NodeHandle& private_node, const ParameterReader& reader) {
-  const auto faults = reader.finish();
+  std::vector<std::string> faults = reader.finish();
+  const std::string file = private_node.param<std::string>("params_file", "");
+  if (!file.empty()) {
+    const std::string path = private_node.getNamespace();
+    try {
+      const auto found = look_through_params(YAML::LoadFile(file), path.substr(path.rfind('/') + 1));
+      for (const std::string& fault : found.faults) faults.push_back(file + ": " + fault);
+      if (!found.hint.empty()) ROS_WARN_STREAM(file << ": " << found.hint);
+    } catch (const YAML::Exception& error) {
+      faults.push_back(file + ": " + error.what());
+    }
+  }
   if (!faults.empty()) throw ParameterError(private_node.getNamespace(), faults);
 }
 

@@ -135,5 +135,24 @@ TEST(LocalFrame, WhatIsNoPlaceConvertsToNaNAndDoesNotThrow) {
   }
 }
 
+// East of one place is, in the frame of another, where a step to the east leads.
+TEST(LocalFrame, ConvergenceTurnsEastIntoTheFrame) {
+  for (const double latitude_deg : {-70.0, -33.0, 0.0, 48.0, 65.0, 89.0}) {
+    const LocalFrame frame({latitude_deg, 179.9, 100.0});
+    EXPECT_NEAR(frame.convergence_rad(frame.datum()), 0.0, 1e-12);
+    for (const double east_deg : {-2.0, 0.01, 1.0}) {
+      GeodeticPosition place{latitude_deg + 0.3, 179.9 + east_deg, 50.0};
+      const Eigen::Vector3d here = frame.to_local(place);
+      place.longitude_deg += 1e-6;
+      const Eigen::Vector3d step = frame.to_local(place) - here;
+      EXPECT_NEAR(frame.convergence_rad({latitude_deg + 0.3, 179.9 + east_deg, 50.0}), std::atan2(step.y(), step.x()),
+                  1e-5);
+    }
+  }
+  const LocalFrame far({65.0, 20.0, 0.0});  // 90 km east of the datum
+  EXPECT_NEAR(far.convergence_rad({65.0, 21.91, 0.0}), 0.03, 0.001);
+  EXPECT_EQ(far.convergence_rad({std::nan(""), 0.0, 0.0}), 0.0);
+}
+
 }  // namespace
 }  // namespace urban_gnss

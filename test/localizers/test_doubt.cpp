@@ -8,7 +8,8 @@ namespace {
 
 // Where sources contradict each other, each localizer becomes as uncertain as it is told to be, and stays where it is.
 TEST(Localizers, DoubtMakesEachOneUncertain) {
-  for (const LocalizerEntry& entry : standard_localizers().entries()) {
+  const LocalizerRegistry registry = standard_localizers();
+  for (const LocalizerEntry& entry : registry.entries()) {
     const auto localizer = entry.settings()->make();
     localizer->initialize(pose_with_sigma({3.0, -4.0, 0.5}, 1.0, 0.05));
     for (int k = 0; k < 10; ++k) localizer->move({1.0, 0.1}, 0.1);

@@ -34,7 +34,10 @@ TEST(DeadReckoning, NoiseDoesNotDependOnTheLengthOfSteps) {
 
 // The motion model's step, against the very motion of the particles: its Jacobian by differences, its noise by draws.
 TEST(DeadReckoning, LinearisesTheMotionModel) {
-  for (const MotionModel model : {MotionModel::kBicycle, MotionModel::kVelocity}) {
+  for (const auto& [model, twist] : {std::pair{MotionModel::kBicycle, Twist2{2.0, 0.4}},
+                                     {MotionModel::kVelocity, Twist2{2.0, 0.4}},
+                                     {MotionModel::kVelocity, Twist2{-1.5, 0.4, 1.1}},
+                                     {MotionModel::kVelocity, Twist2{0.0, -0.3, -2.0}}}) {
     MotionParameters motion;
     motion.motion_model = model;
     motion.wheelbase = 1.3;
@@ -42,7 +45,7 @@ TEST(DeadReckoning, LinearisesTheMotionModel) {
     parameters.motion_noise_factor = 0.5;
     parameters.position_walk = 0.0;
     parameters.heading_walk = 0.0;
-    const MotionStep moved = make_motion_step({2.0, 0.4}, 0.1, motion, parameters);
+    const MotionStep moved = make_motion_step(twist, 0.1, motion, parameters);
     const Pose2 start{3.0, -2.0, 2.9};
     const OdometryErrors errors{0.04, -0.02};
     const DeadReckoningStep step = urban_gnss::dead_reckon(start, errors, moved, parameters);

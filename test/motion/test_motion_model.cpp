@@ -33,6 +33,30 @@ TEST(MotionModel, ChordFormIsThePrintedFormForEveryYawRateEq3) {
   }
 }
 
+TEST(MotionModel, SidewaysIsForwardsOfARobotThatIsTurnedToTheLeft) {
+  RandomEngine engine = make_engine(3);
+  for (int trial = 0; trial < 100; ++trial) {
+    const Pose2 pose = random_pose(engine);
+    const double speed = uniform_between(-3.0, 3.0, engine);
+    const double rate = uniform_between(-2.0, 2.0, engine);
+    const Pose2 sideways = move(pose, {0.0, rate, speed}, 0.3);
+    const Pose2 turned = move({pose.x, pose.y, pose.yaw + 0.5 * kPi}, {speed, rate}, 0.3);
+    EXPECT_TRUE(near(sideways, {turned.x, turned.y, turned.yaw - 0.5 * kPi}, 1e-12));
+  }
+}
+
+TEST(MotionModel, TwistBetweenTwoPosesMovesFromTheOneToTheOther) {
+  RandomEngine engine = make_engine(4);
+  for (double rate = 20.0; rate > 1e-9; rate /= 3.0) {
+    const Pose2 pose = random_pose(engine);
+    const Twist2 twist{uniform_between(-9.0, 9.0, engine), rate, uniform_between(-9.0, 9.0, engine)};
+    const Twist2 found = twist_between(pose, move(pose, twist, 0.1), 0.1);
+    EXPECT_NEAR(found.speed_mps, twist.speed_mps, 1e-9) << rate;
+    EXPECT_NEAR(found.lateral_mps, twist.lateral_mps, 1e-9) << rate;
+    EXPECT_NEAR(found.yaw_rate_radps, twist.yaw_rate_radps, 1e-9) << rate;
+  }
+}
+
 TEST(MotionModel, IsRegularAtYawRateZero) {
   const Pose2 pose{3.0, -2.0, 0.7};
   const double way = 5.0 * 0.4;

@@ -1,46 +1,9 @@
 #include <gtest/gtest.h>
 
-#include "urban_gnss_localization/common/random.hpp"
 #include "urban_gnss_localization/motion/yaw_rate_check.hpp"
 
 namespace urban_gnss {
 namespace {
-
-/// The factor after turning left and right with an IMU that says `factor` times what the odometry says.
-std::optional<double> found(double factor, double duration_s, double noise_radps = 0.02) {
-  YawRateCheck check;
-  RandomEngine engine = make_engine(2);
-  std::optional<double> last;
-  for (int k = 0; k < duration_s / 0.1; ++k) {
-    const double rate = k / 100 % 2 == 0 ? 0.3 : -0.2;
-    if (const auto found = check.add(rate, factor * rate + noise_radps * draw_normal(engine), 0.1)) last = found;
-  }
-  return last;
-}
-
-TEST(YawRateCheck, FindsTheFactorInAMinuteOfTurning) {
-  for (const double factor : {-1.0, 1.0, 57.3, 0.5}) {
-    ASSERT_TRUE(found(factor, 61.0)) << factor;
-    EXPECT_NEAR(*found(factor, 61.0), factor, 0.02) << factor;
-    EXPECT_FALSE(found(factor, 59.0)) << factor;
-  }
-}
-
-TEST(YawRateCheck, StraightWaysSayNothing) {
-  YawRateCheck check;
-  for (int k = 0; k < 100000; ++k) EXPECT_FALSE(check.add(0.04, -1.0, 0.1));
-}
-
-TEST(YawRateCheck, BeginsAnewAfterEachMinute) {
-  YawRateCheck check;
-  const auto minute = [&](double imu) {
-    std::optional<double> last;
-    for (int k = 0; k < 601 && !last; ++k) last = check.add(0.1, imu, 0.1);
-    return last;
-  };
-  EXPECT_NEAR(*minute(0.1), 1.0, 1e-9);
-  EXPECT_NEAR(*minute(-0.1), -1.0, 1e-9);
-}
 
 /// Both rates at 20 Hz, of a robot that rolls at 1 m/s.
 struct Rates {

@@ -12,7 +12,8 @@ namespace {
 
 TEST(SampleMotion, IsMoveNoisilyDrawByDraw) {
   for (const MotionModel model : {MotionModel::kBicycle, MotionModel::kVelocity}) {
-    for (const Twist2 twist : {Twist2{3.0, 0.7}, Twist2{-1.0, 0.0}, Twist2{0.0, 0.4}, Twist2{0.0, 0.0}}) {
+    for (const Twist2 twist : {Twist2{3.0, 0.7}, Twist2{-1.0, 0.0}, Twist2{0.0, 0.4}, Twist2{0.0, 0.0},
+                               Twist2{-1.0, 0.3, 2.0}, Twist2{0.0, 0.0, -1.0}}) {
       MotionParameters parameters;
       parameters.motion_model = model;
       parameters.wheelbase = 1.7;

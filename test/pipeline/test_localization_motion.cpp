@@ -175,7 +175,7 @@ TEST(LocalizationMotion, ImuYawRateReplacesTheOdometrys) {
     Rig rig(std::string("{datum: [33.0, 130.0, 20.0], initial_pose: [0.0, 0.0, 0.0], use_imu_yaw_rate: ") +
             (use ? "true}" : "false}"));
     rig.drive(0.0);
-    rig.pipeline.add_imu_yaw_rate(Rig::at(0.0), 99.0);  // belongs to the step before; and absurd
+    rig.pipeline.add_imu_yaw_rate(Rig::at(0.0), 0.7);  // belongs to the step before
     rig.pipeline.add_imu_yaw_rate(Rig::at(0.02), 0.2);
     rig.pipeline.add_imu_yaw_rate(Rig::at(0.06), 0.3);
     rig.pipeline.add_imu_yaw_rate(Rig::at(0.12), 0.4);  // belongs to the step after
@@ -243,6 +243,122 @@ TEST(LocalizationMotion, ImuThatContradictsTheOdometryIsSaidOnce) {
     }
     EXPECT_EQ(count, warnings) << factor;
   }
+}
+
+TEST(LocalizationMotion, VelocityIsTurnedByTheConvergenceOfTheMeridians) {
+  const GeodeticPosition robot{65.0, 21.91, 0.0};
+  const LocalFrame map({65.0, 20.0, 0.0});
+  LocalizationParameters parameters;
+  parameters.datum.datum = {65.0, 20.0, 0.0};
+  auto owned = std::make_unique<FakeLocalizer>();
+  FakeLocalizer& fake = *owned;
+  LocalizationPipeline pipeline(parameters, std::move(owned));
+  const Eigen::Vector3d place = map.to_local(robot);
+  pipeline.set_pose({{place.x(), place.y(), 0.0}, 0.01 * Eigen::Matrix3d::Identity()});
+  RawFix fix;
+  fix.has_fix = true;
+  fix.position = robot;
+  fix.covariance = Eigen::Matrix3d::Identity();
+  fix.covariance_type = CovarianceType::kKnown;
+  for (int k = 0; k <= 20; ++k) {
+    const Stamp stamp = Rig::at(0.1 * k);
+    pipeline.add_odometry({stamp, {0.2 * k, 0.0, 0.0}, {2.0, 0.0}});
+    if (k == 5) {
+      fix.stamp = stamp;
+      pipeline.add_fix(fix);
+    }
+    RawVelocity east{stamp, {2.0, 0.0}, 0.01 * Eigen::Matrix2d::Identity()};
+    if (k == 10) pipeline.add_velocity(east);
+  }
+  ASSERT_EQ(fake.velocities.size(), 1u);
+  const Eigen::Vector2d& measured = fake.velocities[0].velocity;
+  EXPECT_NEAR(measured.norm(), 2.0, 1e-9);
+  EXPECT_NEAR(std::atan2(measured.y(), measured.x()), map.convergence_rad(robot), 1e-9);
+  EXPECT_GT(std::atan2(measured.y(), measured.x()), 0.029);
+}
+
+TEST(LocalizationMotion, StampsOfAnotherClockAreNamed) {
+  Rig rig(kGiven);
+  for (int k = 0; k <= 200; ++k) {
+    rig.drive(0.1 * k);
+    rig.pipeline.add_imu_yaw_rate(Rig::at(0.1 * k + 3600.0), 0.3);
+    if (k % 10 == 0) rig.pipeline.add_fix(raw_fix(Rig::at(0.1 * k + 18.0), {0.0, 0.0}));
+  }
+  int imu = 0;
+  int fixes = 0;
+  for (const PipelineEvent& event : rig.pipeline.take_events()) {
+    imu += event.text.find("stamps of IMU are 3600.0 s ahead") != std::string::npos;
+    fixes += event.text.find("GPS time in place of UTC") != std::string::npos;
+  }
+  EXPECT_EQ(imu, 1);
+  EXPECT_EQ(fixes, 1);
+  for (const FixOutcome& outcome : rig.pipeline.take_outcomes()) {
+    EXPECT_EQ(outcome.decision, FixDecision::kRejectedStale);
+    EXPECT_NE(outcome.reason.find("GPS time"), std::string::npos) << outcome.reason;
+  }
+}
+
+// Upside down, and tf says so; NED, which its accelerometer tells; and what nothing tells but the wheels.
+TEST(LocalizationMotion, YawRateIsThatOfTheRobotHoweverTheImuIsMounted) {
+  const Eigen::Quaterniond upside_down(Eigen::AngleAxisd(kPi, Eigen::Vector3d::UnitX()));
+  for (const auto& [told, gravity] : {std::pair{true, false}, {false, true}, {false, false}}) {
+    Rig rig(kGiven);
+    if (told) rig.pipeline.set_imu_mounting(upside_down);
+    for (int k = 0; k <= 400; ++k) {
+      ImuSample sample;
+      sample.stamp = Rig::at(0.1 * k);
+      sample.rate_radps = {0.0, 0.0, -Rig::kTwist.yaw_rate_radps - 0.001};
+      if (gravity) sample.acceleration_mps2 = {0.0, 0.0, -9.81};
+      rig.pipeline.add_imu(sample);
+      rig.drive(0.1 * k);
+    }
+    const double used_radps = rig.fake->moves.back().first.yaw_rate_radps;
+    EXPECT_NEAR(used_radps, Rig::kTwist.yaw_rate_radps + (told || gravity ? 0.001 : 0.0), 1e-9);
+    EXPECT_EQ(has_event(rig.pipeline, Level::kWarn, "times the odometry's"), !told);
+  }
+}
+
+TEST(LocalizationMotion, OneFalseRateOfTheGyroscopeIsLeftOutAndSaid) {
+  for (const double odometry_hz : {10.0, 50.0}) {
+    for (const double amplitude : {3.0, -8.0, 30.0, 200.0}) {
+      Rig rig(kGiven);
+      const int every = static_cast<int>(50.0 / odometry_hz);
+      for (int k = 0; k <= 1000; ++k) {
+        rig.pipeline.add_imu_yaw_rate(Rig::at(0.02 * k), k == 503 ? amplitude : 0.1);
+        if (k % every == 0) rig.drive(0.02 * k);
+      }
+      for (const auto& [twist, duration_s] : rig.fake->moves) ASSERT_NEAR(twist.yaw_rate_radps, 0.1, 1e-9);
+      EXPECT_TRUE(has_event(rig.pipeline, Level::kWarn, "far from its neighbours")) << amplitude;
+    }
+  }
+}
+
+TEST(LocalizationMotion, ATwistOfZeroBesideAPoseThatMovesIsReplaced) {
+  Rig rig(kGiven);
+  for (int k = 0; k <= 300; ++k) {
+    OdometrySample sample = Rig::odometry(0.1 * k);
+    sample.twist = {};
+    if (k % 10 == 0) rig.fix(0.1 * k);
+    rig.pipeline.add_odometry(sample);
+  }
+  EXPECT_TRUE(has_event(rig.pipeline, Level::kWarn, "the twist is not filled in"));
+  EXPECT_NEAR(rig.fake->moves.back().first.speed_mps, 2.0, 1e-6);
+  EXPECT_NEAR(rig.fake->moves.back().first.yaw_rate_radps, 0.1, 1e-6);
+  EXPECT_GT(rig.fake->doubted.position_m2, 0.0) << "what was lost until then";
+  EXPECT_TRUE(rig.pipeline.report().healthy) << rig.pipeline.report().reason;
+}
+
+TEST(LocalizationMotion, AContradictionThatNothingResolvesIsNotHealthy) {
+  Rig rig(kGiven);
+  for (int k = 0; k <= 300; ++k) {
+    OdometrySample sample = Rig::odometry(0.1 * k);
+    sample.twist.speed_mps *= 3.6;
+    rig.pipeline.add_odometry(sample);
+    if (k < 200 && k % 50 == 0) rig.fix(0.1 * k);
+  }
+  EXPECT_TRUE(has_event(rig.pipeline, Level::kWarn, "km/h"));
+  EXPECT_FALSE(rig.pipeline.report().healthy);
+  EXPECT_NEAR(rig.fake->moves.back().first.speed_mps, 2.0, 1e-6) << "the pose's, meanwhile";
 }
 
 }  // namespace

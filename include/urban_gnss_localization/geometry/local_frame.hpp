@@ -39,6 +39,11 @@ class LocalFrame {
   /// three. Never throws.
   GeodeticPosition to_geodetic(const Eigen::Vector3d& enu) const;
 
+  /// The angle (rad, counter-clockwise) by which east at the place is turned from the frame's x axis, as meridians
+  /// converge: near the datum 0; 90 km east of it, at 65 degrees north, 0.03. What a receiver says in east and north,
+  /// turned by it, is in the frame. 0 for what is no place.
+  double convergence_rad(const GeodeticPosition& position) const;
+
   const GeodeticPosition& datum() const { return datum_; }
 
  private:

@@ -1,15 +1,22 @@
 #pragma once
 
+#include <Eigen/Core>
+#include <cmath>
+
 #include "urban_gnss_localization/common/parameters.hpp"
 #include "urban_gnss_localization/common/random.hpp"
 #include "urban_gnss_localization/geometry/pose2.hpp"
 
 namespace urban_gnss {
 
-/// Forward speed and yaw rate (counter-clockwise) of the robot's base.
+/// Speed and yaw rate (counter-clockwise) of the robot's base.
 struct Twist2 {
-  double speed_mps{0.0};
+  double speed_mps{0.0};  ///< forwards
   double yaw_rate_radps{0.0};
+  double lateral_mps{0.0};  ///< to the left: of a holonomic robot, or of a base that is not on the axle
+
+  /// Of the motion over ground, whatever its direction.
+  double ground_speed_mps() const { return std::hypot(speed_mps, lateral_mps); }
 };
 
 /// Nishida et al. eq. (2): speed of the driven rear axle and angle of the steered front wheel (counter-clockwise).
@@ -28,6 +35,9 @@ BicycleInput bicycle_input(const Twist2& twist, double wheelbase_m);
 /// Eq. (3) in chord form, regular at yaw rate 0: the pose after moving for `duration_s` at constant twist. The yaw is
 /// wrapped.
 Pose2 move(const Pose2& pose, const Twist2& twist, double duration_s);
+/// The constant twist that moves from one pose to the other: the inverse of move(). Requires duration_s > 0 and a turn
+/// below pi.
+Twist2 twist_between(const Pose2& from, const Pose2& to, double duration_s);
 
 /// Which pair of inputs the noise of eq. (5)-(7) is put on.
 enum class MotionModel {
@@ -41,7 +51,8 @@ EnumNames<MotionModel> enum_names(MotionModel);
 ///   speed    odom_alpha1 v^2 + odom_alpha2 i^2   (m/s)^2
 ///   input i  odom_alpha3 v^2 + odom_alpha4 i^2   rad^2 or (rad/s)^2
 ///   yaw rate odom_alpha5 v^2 + odom_alpha6 i^2   (rad/s)^2
-/// times `odom_noise_scale`. A step of another length gets the variance that diffuses as much per second.
+/// times `odom_noise_scale`, where v is the speed over ground and its noise acts along the direction of motion. A step
+/// of another length gets the variance that diffuses as much per second.
 struct MotionParameters {
   MotionModel motion_model{MotionModel::kVelocity};
   double wheelbase{1.0};
@@ -95,10 +106,11 @@ struct MotionStep {
   double duration_s{0.0};
   MotionModel model{MotionModel::kVelocity};
   double wheelbase_m{1.0};
-  double steering_rad{0.0};    ///< for kBicycle
-  double speed_sigma{0.0};     ///< m/s
-  double input_sigma{0.0};     ///< rad (kBicycle: steering) or rad/s (kVelocity: yaw rate)
-  double yaw_rate_sigma{0.0};  ///< rad/s, the disturbance of eq. (7)
+  double steering_rad{0.0};             ///< for kBicycle
+  double speed_sigma{0.0};              ///< m/s, along `direction`
+  Eigen::Vector2d direction{1.0, 0.0};  ///< of the motion over ground, forwards and left; (1, 0) also backwards
+  double input_sigma{0.0};              ///< rad (kBicycle: steering) or rad/s (kVelocity: yaw rate)
+  double yaw_rate_sigma{0.0};           ///< rad/s, the disturbance of eq. (7)
 };
 
 MotionStep make_motion_step(const Twist2& twist, double duration_s, const MotionParameters& parameters);
@@ -130,7 +142,8 @@ struct OdometryErrors {
 /// The measured twist, freed of its errors.
 inline Twist2 corrected(const Twist2& measured, const OdometryErrors& errors) {
   return {measured.speed_mps + errors.speed_scale * measured.speed_mps,
-          measured.yaw_rate_radps + errors.yaw_rate_scale * measured.yaw_rate_radps + errors.yaw_rate_bias_radps};
+          measured.yaw_rate_radps + errors.yaw_rate_scale * measured.yaw_rate_radps + errors.yaw_rate_bias_radps,
+          measured.lateral_mps + errors.speed_scale * measured.lateral_mps};
 }
 
 /// Eq. (5)-(8): one noisy step of one pose, whose noise-free part is the corrected twist. The particle filter's array

@@ -2,6 +2,7 @@
 
 #include <deque>
 #include <optional>
+#include <string>
 
 #include "urban_gnss_localization/common/stamp.hpp"
 #include "urban_gnss_localization/motion/motion_model.hpp"
@@ -13,9 +14,14 @@ struct OdometrySample {
   Stamp stamp{0};
   Pose2 pose;  ///< base in the odometry frame, as published: what tf's odom -> base_link says
   Twist2 twist;
+  bool has_pose{true};   ///< the message has one: its quaternion is not 0
+  bool has_twist{true};  ///< it does not say that it has none (covariance -1)
 };
 
-/// Why an odometry message was not used; empty where it can be: non-finite or absurd values.
+/// Whether a robot can move so: below 150 m/s and 50 rad/s.
+bool is_plausible(const Twist2& twist);
+
+/// Why an odometry message was not used; empty where it can be: non-finite or absurd values, or neither pose nor twist.
 std::string odometry_fault(const OdometrySample& sample);
 
 /// The dead-reckoned path of the last seconds, so that a fix can be compared with the robot's pose at the fix's own

@@ -12,6 +12,7 @@
 #include "urban_gnss_localization/pipeline/fix_queue.hpp"
 #include "urban_gnss_localization/pipeline/input_clocks.hpp"
 #include "urban_gnss_localization/pipeline/input_parameters.hpp"
+#include "urban_gnss_localization/pipeline/odometry_source.hpp"
 #include "urban_gnss_localization/pipeline/pipeline_event.hpp"
 
 namespace urban_gnss {
@@ -40,7 +41,7 @@ class BiasPipeline {
   void set_datum(const GeodeticPosition& datum);
   /// Sets the antenna's place in the base frame (m), e.g. as tf says it. Requires finite numbers.
   void set_antenna_offset(const Eigen::Vector2d& offset) { antenna_ = offset; }
-  void add_odometry(const OdometrySample& sample);
+  void add_odometry(const OdometrySample& told);
   /// The localizer's estimate of the base in the map frame.
   void add_estimate(Stamp stamp, const Pose2& pose);
   void add_fix(const RawFix& fix);
@@ -64,6 +65,7 @@ class BiasPipeline {
   BiasTracker tracker_;
   InputClocks clocks_;
   std::optional<LocalFrame> frame_;
+  OdometrySource odometry_;
   OdometryHistory history_;
   std::deque<std::pair<Stamp, Pose2>> poses_;  ///< the localizer's estimates
   FixQueue fixes_;

@@ -15,9 +15,11 @@
 #include "urban_gnss_localization/pipeline/input_clocks.hpp"
 #include "urban_gnss_localization/pipeline/localization_parameters.hpp"
 #include "urban_gnss_localization/pipeline/map_datum.hpp"
+#include "urban_gnss_localization/pipeline/odometry_source.hpp"
 #include "urban_gnss_localization/pipeline/pipeline_event.hpp"
 #include "urban_gnss_localization/pipeline/start_supervisor.hpp"
 #include "urban_gnss_localization/pipeline/status_reporter.hpp"
+#include "urban_gnss_localization/pipeline/stream_offsets.hpp"
 #include "urban_gnss_localization/pipeline/velocity_queue.hpp"
 #include "urban_gnss_localization/pipeline/yaw_rate_source.hpp"
 
@@ -51,8 +53,12 @@ class LocalizationPipeline {
   /// Requires parameters without faults.
   LocalizationPipeline(const LocalizationParameters& parameters, std::unique_ptr<Localizer> localizer);
 
-  void add_odometry(const OdometrySample& sample);
-  /// The IMU's yaw rate, which YawRateSource puts in place of the odometry's.
+  void add_odometry(const OdometrySample& message);
+  /// The IMU, whose yaw rate YawRateSource puts in place of the odometry's.
+  void add_imu(const ImuSample& sample);
+  /// How the IMU is mounted: its frame in the base frame, as tf says it. Requires a unit quaternion.
+  void set_imu_mounting(const Eigen::Quaterniond& base_from_imu) { imu_.set_mounting(base_from_imu); }
+  /// The same of an IMU that tells nothing but its yaw rate, of the robot.
   void add_imu_yaw_rate(Stamp stamp, double yaw_rate_radps);
   void add_fix(const RawFix& fix);
   /// Whether velocities of the receiver change anything: where they are wanted, and the localizer makes use of them.
@@ -104,15 +110,22 @@ class LocalizationPipeline {
   std::string waiting_for() const;
 
  private:
+  void add_imu_rate(const ImuYawRate& rate);
   /// Whether the stamp is newer than the stream's last, or the stream's clock was set back, which resets everything.
   bool is_new(InputStream stream, Stamp stamp);
   /// A message was left out for its stamp: says once of each stream where that was never set.
   void note_unset_stamp(InputStream stream, Stamp stamp);
   /// Whether the stamp is farther ahead of the odometry than any delay explains.
   bool is_far_ahead(Stamp stamp) const;
+  /// Why it cannot be used, then.
+  std::string far_ahead(Stamp stamp) const;
   void forget_odometry(double gap_s);
+  /// The odometry is moved by another part of its messages from now on.
+  void change_odometry();
   void process_velocities();
   void process_velocity(const RawVelocity& velocity);
+  /// rad, by which what the receiver calls east is turned from the map's x axis, counter-clockwise.
+  double convergence_rad() const { return place_ && frame() ? frame()->convergence_rad(*place_) : 0.0; }
 
   void process_fixes();
   bool process_next_fix();
@@ -146,9 +159,14 @@ class LocalizationPipeline {
   Eigen::Vector2d antenna_;  ///< m, in the base frame
   InputClocks clocks_;
   std::set<InputStream> unset_stamps_;  ///< that were said
+  StreamOffsets offsets_;
+  bool said_far_imu_{false};
   MapDatum datum_;
+  std::optional<GeodeticPosition> place_;  ///< of the last fix that has one
   OdometryHistory history_;
   std::size_t epoch_{0};
+  OdometrySource odometry_;
+  ImuLeveller imu_;
   YawRateSource yaw_rate_;
   SpeedSource speed_;
   VelocityQueue velocities_;

@@ -54,6 +54,8 @@ class SpeedSource {
   bool is_wrong() const { return check_.fault() != SpeedFault::kNone || is_contradicted_; }
   /// Why the odometry's speed is not believed; empty where it is.
   std::string complaint() const;
+  /// The odometry's next speed is another source's: it may differ from the last by any amount.
+  void expect_jump() { last_mps_.reset(); }
   /// The estimate started anew: its heading has shown no sign yet.
   void forget_heading() { has_agreed_ = false; }
   void reset() { *this = SpeedSource(parameters_); }

@@ -22,6 +22,7 @@
 #include "urban_gnss_localization/localizers/bias_estimate.hpp"
 #include "urban_gnss_localization/localizers/particle_set.hpp"
 #include "urban_gnss_localization/pipeline/localization_pipeline.hpp"
+#include "urban_gnss_localization/ros/topics.hpp"
 
 /// Between messages and the core's types. Nothing here decides or computes anything of its own.
 namespace urban_gnss {
@@ -36,6 +37,7 @@ struct Frames {
     v.basic()("map_frame", map, "frame fixed to the world: x east, y north of the datum");
     v.basic()("odom_frame", odom, "frame of the odometry's pose");
     v.basic()("base_link_frame", base_link, "frame of the robot; Nishida et al. put it on the rear axle");
+    for (std::string* each : {&map, &odom, &base_link}) *each = without_leading_slash(*each);  // as tf had them
   }
   void check(std::vector<std::string>& faults) const;
 };
@@ -68,10 +70,11 @@ inline constexpr char kVelocityTypes[] = "geometry_msgs/TwistWithCovarianceStamp
 sensor_msgs::NavSatFix to_message(const GeodeticPosition& place, const ros::Time& time, const std::string& frame);
 GeodeticPosition to_geodetic(const sensor_msgs::NavSatFix& message);
 
+/// A quaternion of 0 is no pose; a covariance of -1 says that there is no twist.
 OdometrySample to_odometry_sample(const nav_msgs::Odometry& message);
-/// Yaw rate about the vertical: the angular velocity turned by the orientation where the message has one (an IMU may be
-/// mounted at any angle), else its z axis. Nothing where it is not finite or said not to be there.
-std::optional<double> to_yaw_rate(const sensor_msgs::Imu& message);
+/// Nothing where there is no angular velocity: it is not finite, or said not to be there. The same holds for
+/// orientation and acceleration alone.
+std::optional<ImuSample> to_imu_sample(const sensor_msgs::Imu& message);
 /// Planar part; yaw NaN where the quaternion has no direction.
 Pose2 to_pose2(const geometry_msgs::Pose& pose);
 geometry_msgs::Pose to_message(const Pose2& pose);

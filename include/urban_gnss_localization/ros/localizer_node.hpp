@@ -24,6 +24,7 @@
 #include "urban_gnss_localization/ros/event_log.hpp"
 #include "urban_gnss_localization/ros/input_watch.hpp"
 #include "urban_gnss_localization/ros/map_services.hpp"
+#include "urban_gnss_localization/ros/sensor_frames.hpp"
 
 namespace urban_gnss {
 
@@ -34,6 +35,9 @@ struct LocalizerNodeParameters {
   double transform_time_offset{0.0};
   bool antenna_offset_from_tf{true};
   LocalizationParameters localization;
+
+  /// Whether the antenna's place is looked up in tf.
+  bool wants_antenna_from_tf() const { return antenna_offset_from_tf && localization.input.antenna().norm() == 0.0; }
 
   void visit(ParameterVisitor& v) {
     v.include(frames);
@@ -89,7 +93,7 @@ class LocalizerNode {
   void publish_results();
   void publish_datum();
   void publish_status();
-  void look_up_antenna();
+  void look_up_sensors();
   void every_second();
   void every_five_seconds();
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
@@ -99,8 +103,7 @@ class LocalizerNode {
   OutputHook on_output_;
   EventLog log_;
   Stamp newest_input_{0};
-  bool antenna_known_{false};
-  bool antenna_warned_{false};
+  SensorFrames sensor_frames_;
   std::uint64_t outputs_{0};
 
   ros::Publisher estimate_publisher_;

@@ -15,7 +15,8 @@ YAML::Node private_parameters(const ros::NodeHandle& private_node);
 
 /// For a node that must read one struct to know which others to read. finish_reading() must come last.
 ParameterReader private_parameter_reader(const ros::NodeHandle& private_node);
-/// Throws ParameterError with every fault.
+/// Throws ParameterError with every fault, those of the file `~params_file` too; warns where that has no section for
+/// the node.
 void finish_reading(const ros::NodeHandle& private_node, const ParameterReader& reader);
 
 /// Reads structs out of the node's private parameters. Throws ParameterError with every fault of all of them.

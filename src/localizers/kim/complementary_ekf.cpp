@@ -62,7 +62,7 @@ void ComplementaryEkf::move(const Twist2& twist, double duration_s) {
   DeadReckoningStep step = dead_reckon(pose_, errors_, motion, parameters_.odometry);
   if (heading_search_) {
     // Which way it went is unknown: the position stays and becomes uncertain by the distance.
-    const double distance_m = std::abs(twist.speed_mps) * duration_s;
+    const double distance_m = twist.ground_speed_mps() * duration_s;
     step.noise.topLeftCorner<2, 2>().diagonal().array() += distance_m * (distance_m + 2.0 * since_fix_.distance_m);
     step.transition.topRows<2>().rightCols<3>().setZero();
     step.pose.x = pose_.x;

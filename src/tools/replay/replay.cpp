@@ -137,6 +137,7 @@ int replay_main(int argc, char** argv, const LocalizerRegistry& localizers) {
   std::string odometry = "topic";
   app.add_flag("--list-variants", only_names, "print the names under which localizers are compared, and end");
   app.add_option("--localizer", options.localizer, localizers.names() + ", or a name of --list-variants");
+  app.add_option("--robot", options.robot, "differential, ackermann, holonomic or car: what is known of its wheels");
   app.add_option("--params", options.params, "YAML with the nodes' parameters; repeatable, later files win");
   line.add_set("--set", options.overrides, "a parameter of the localizer, or after gps_bias. of the bias filter");
   app.add_option("--output", options.output, "bag to write: odometry/filtered, gps/filtered, gps/bias, status, tf");

@@ -31,7 +31,9 @@ struct Topics {
         truth(without_leading_slash(options.truth_topic)) {}
 
   /// In the order in which messages of one time are read.
-  std::vector<std::string> ordered() const { return {topics::kDatum, imu, odom, fix, velocity, satellites, truth}; }
+  std::vector<std::string> ordered() const {
+    return {topics::kDatum, topics::kStaticTf, imu, odom, fix, velocity, satellites, truth};
+  }
 
   std::string fix, odom, imu, velocity, satellites, truth;
 };
@@ -55,9 +57,9 @@ void require_topics(const rosbag::Bag& bag, const Messages& messages, const Repl
 void give(const rosbag::MessageInstance& message, const Topics& names, ReplayRun& run) {
   const std::string name = without_leading_slash(message.getTopic());
   if (name == names.odom) {
-    run.add_odometry(to_odometry_sample(*expect<nav_msgs::Odometry>(message)));
+    run.add_odometry(*expect<nav_msgs::Odometry>(message));
   } else if (name == names.fix) {
-    run.add_fix(to_raw_fix(*expect<sensor_msgs::NavSatFix>(message)));
+    run.add_fix(*expect<sensor_msgs::NavSatFix>(message));
   } else if (name == names.velocity) {
     const auto measured = to_raw_velocity_of(message);
     if (!measured) throw wrong_type(message, kVelocityTypes);
@@ -66,6 +68,8 @@ void give(const rosbag::MessageInstance& message, const Topics& names, ReplayRun
     run.add_satellites(to_satellite_epoch(*expect<SatelliteArray>(message)));
   } else if (name == names.imu) {
     run.add_imu(*expect<sensor_msgs::Imu>(message));
+  } else if (name == topics::kStaticTf) {
+    run.add_static_tf(*expect<tf2_msgs::TFMessage>(message));
   } else if (name == names.truth) {
     run.add_truth(*expect<nav_msgs::Odometry>(message));
   } else {
@@ -147,8 +151,10 @@ void ReplayInputs::read_topics(const ReplayOptions& options) {
   const Messages messages = ordered_messages(bag_, wanted);
   require_topics(bag_, messages, options, names, receiver_.has_value());
   for (const rosbag::MessageInstance& message : messages) {
-    inputs_.push_back({to_stamp(message.getTime()), [message, names](ReplayRun& run) { give(message, names, run); },
-                       without_leading_slash(message.getTopic()) == topics::kDatum});
+    const std::string topic = without_leading_slash(message.getTopic());
+    const bool is_latched = topic == topics::kDatum || topic == topics::kStaticTf;
+    inputs_.push_back(
+        {to_stamp(message.getTime()), [message, names](ReplayRun& run) { give(message, names, run); }, is_latched});
   }
 }
 

@@ -1,7 +1,5 @@
 #include "replay_run.hpp"
 
-#include <tf2_msgs/TFMessage.h>
-
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
@@ -25,6 +23,7 @@ constexpr double kKnownHeading_rad = degrees_to_radians(10.0);
 ReplayRun::ReplayRun(const ReplayOptions& options, const ReplaySettings& settings)
     : shell_(settings.localizer.shell),
       pipeline_(shell_.localization, settings.localizer.localizer->make()),
+      sensor_frames_(shell_.frames, shell_.wants_antenna_from_tf()),
       bias_responder_(settings.gps_bias.bias.bias) {
   if (options.output.empty()) return;
   const std::filesystem::path path(options.output);
@@ -39,13 +38,38 @@ void ReplayRun::add_odometry(const OdometrySample& sample) {
   settle();
 }
 
+void ReplayRun::add_odometry(const nav_msgs::Odometry& message) {
+  sensor_frames_.observe_odometry(message.header.frame_id, message.child_frame_id);
+  add_odometry(to_odometry_sample(message));
+}
+
 void ReplayRun::add_imu(const sensor_msgs::Imu& message) {
-  if (const auto rate = to_yaw_rate(message)) pipeline_.add_imu_yaw_rate(to_stamp(message.header.stamp), *rate);
+  sensor_frames_.observe_imu(message.header.frame_id);
+  look_up_sensors();
+  if (const auto sample = to_imu_sample(message)) pipeline_.add_imu(*sample);
+}
+
+void ReplayRun::add_static_tf(const tf2_msgs::TFMessage& message) {
+  for (geometry_msgs::TransformStamped transform : message.transforms) {
+    transform.header.frame_id = without_leading_slash(transform.header.frame_id);
+    transform.child_frame_id = without_leading_slash(transform.child_frame_id);
+    tf_.setTransform(transform, "bag", true);
+  }
+}
+
+void ReplayRun::look_up_sensors() {
+  if (!sensor_frames_.is_complete()) sensor_frames_.look_up(tf_, pipeline_);
 }
 
 void ReplayRun::add_fix(const RawFix& fix) {
   pipeline_.add_fix(fix);
   settle();
+}
+
+void ReplayRun::add_fix(const sensor_msgs::NavSatFix& message) {
+  sensor_frames_.observe_fix(message.header.frame_id);
+  look_up_sensors();
+  add_fix(to_raw_fix(message));
 }
 
 void ReplayRun::add_velocity(const RawVelocity& velocity) {
@@ -107,9 +131,8 @@ std::optional<Trajectory> ReplayRun::truth() const {
 
 void ReplayRun::settle() {
   write_biases(bias_responder_.answer(pipeline_));
-  for (const PipelineEvent& event : pipeline_.take_events()) {
-    std::cerr << "[" << std::fixed << std::setprecision(3) << to_seconds(newest_) << "] " << event.text << '\n';
-  }
+  print(sensor_frames_.take_events());
+  print(pipeline_.take_events());
   for (const LocalizationOutput& output : pipeline_.take_outputs()) {
     estimate_.push_back({output.stamp, output.estimate.pose, output.estimate.covariance});
     write(topics::kEstimate, output.stamp, to_message(output, shell_.frames));
@@ -123,6 +146,12 @@ void ReplayRun::settle() {
   for (const FixOutcome& outcome : outcomes) ++decisions_[to_string(outcome.decision)];
   for (const auto& status : to_status_messages(pipeline_, outcomes, to_ros(newest_), shell_.frames.map)) {
     write(topics::kStatus, newest_, status);
+  }
+}
+
+void ReplayRun::print(const std::vector<PipelineEvent>& events) const {
+  for (const PipelineEvent& event : events) {
+    std::cerr << "[" << std::fixed << std::setprecision(3) << to_seconds(newest_) << "] " << event.text << '\n';
   }
 }
 

@@ -4,6 +4,8 @@
 #include <rosbag/bag.h>
 #include <sensor_msgs/Imu.h>
 #include <sensor_msgs/NavSatFix.h>
+#include <tf2/buffer_core.h>
+#include <tf2_msgs/TFMessage.h>
 
 #include <cstddef>
 #include <map>
@@ -16,6 +18,7 @@
 #include "urban_gnss_localization/pipeline/bias_responder.hpp"
 #include "urban_gnss_localization/pipeline/localization_pipeline.hpp"
 #include "urban_gnss_localization/receivers/receiver_output.hpp"
+#include "urban_gnss_localization/ros/sensor_frames.hpp"
 
 namespace urban_gnss {
 
@@ -26,8 +29,12 @@ class ReplayRun {
   ReplayRun(const ReplayOptions& options, const ReplaySettings& settings);
 
   void add_odometry(const OdometrySample& sample);
+  void add_odometry(const nav_msgs::Odometry& message);
   void add_imu(const sensor_msgs::Imu& message);
   void add_fix(const RawFix& fix);
+  void add_fix(const sensor_msgs::NavSatFix& message);
+  /// What does not move: of the tf of a bag, only that is used.
+  void add_static_tf(const tf2_msgs::TFMessage& message);
   void add_velocity(const RawVelocity& velocity);
   void add_satellites(const SatelliteEpoch& epoch);
   void set_datum(const sensor_msgs::NavSatFix& message);
@@ -49,12 +56,16 @@ class ReplayRun {
  private:
   /// Answers the pipeline's questions for the bias, as gps_bias_node does live, and writes what came of it.
   void settle();
+  void look_up_sensors();
+  void print(const std::vector<PipelineEvent>& events) const;
   void write_biases(const std::vector<BiasEstimate>& biases);
   template <class M>
   void write(const std::string& topic, Stamp stamp, const M& message);
 
   LocalizerNodeParameters shell_;
   LocalizationPipeline pipeline_;
+  tf2::BufferCore tf_;
+  SensorFrames sensor_frames_;
   BiasResponder bias_responder_;
   rosbag::Bag bag_;
   Stamp newest_{0};

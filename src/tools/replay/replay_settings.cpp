@@ -1,9 +1,11 @@
 #include "replay_settings.hpp"
 
 #include <algorithm>
+#include <filesystem>
 #include <optional>
 #include <utility>
 
+#include "find_scenario.hpp"
 #include "overrides.hpp"
 #include "urban_gnss_localization/parameters/parameter_list.hpp"
 
@@ -19,7 +21,8 @@ struct Maps {
   YAML::Node of_gps_bias{YAML::NodeType::Map};
 };
 
-void merge_file(const std::string& file, const LocalizerRegistry& localizers, Maps& maps) {
+/// Merges the sections of a file; returns what stands outside of them.
+YAML::Node merge_sections(const std::string& file, const LocalizerRegistry& localizers, Maps& maps) {
   YAML::Node map = load_map(file);
   std::vector<std::string> sections{kGpsBias};
   for (const LocalizerEntry& each : localizers.entries()) sections.push_back(each.name);
@@ -29,7 +32,22 @@ void merge_file(const std::string& file, const LocalizerRegistry& localizers, Ma
     if (section == kGpsBias) merge(maps.of_gps_bias, map[section]);
     map.remove(section);  // of another node
   }
-  merge(maps.of_localizer, map);
+  return map;
+}
+
+void merge_file(const std::string& file, const LocalizerRegistry& localizers, Maps& maps) {
+  merge(maps.of_localizer, merge_sections(file, localizers, maps));
+}
+
+/// What is known of a kind of robot. Throws std::runtime_error that lists the kinds where there is none of this name.
+std::string robot_file(const std::string& robot) {
+  namespace fs = std::filesystem;
+  const fs::path folder = package_path() / "config" / "robots";
+  const fs::path file = folder / (robot + ".yaml");
+  if (fs::is_regular_file(file)) return file;
+  std::string known;
+  for (const auto& entry : fs::directory_iterator(folder)) known += " " + entry.path().stem().string();
+  throw std::runtime_error("--robot " + robot + ": must be one of" + known);
 }
 
 void assign_option(const std::string& text, Maps& maps) {
@@ -70,6 +88,7 @@ ReplaySettings read_settings(const ReplayOptions& options, const LocalizerRegist
   ReplaySettings settings{LocalizerNodeSettings(*choice.entry), {}};
   Maps maps{choice.entry->name};
   if (options.without_odometry) assign_without_odometry(settings.localizer, maps.of_localizer);
+  if (!options.robot.empty()) merge_sections(robot_file(options.robot), localizers, maps);
   for (const std::string& file : options.params) merge_file(file, localizers, maps);
   for (const std::string& text : choice.assignments) assign(maps.of_localizer, text);
   if (options.wants_imu) assign(maps.of_localizer, "expert.imu.use_imu_yaw_rate=true");

@@ -15,6 +15,7 @@ namespace urban_gnss {
 struct ReplayOptions {
   std::string input;
   std::string localizer = "imm_ekf";
+  std::string robot;  ///< a file of config/robots; empty: the defaults, which are those of `differential`
   std::vector<std::string> params;
   std::vector<std::string> overrides;
   std::string output;

@@ -1,0 +1,154 @@
+// The motion in a LocalizationPipeline: odometry, IMU, and the receiver's velocity.
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <utility>
+
+#include "limits.hpp"
+#include "text.hpp"
+#include "told_start.hpp"
+#include "urban_gnss_localization/pipeline/localization_pipeline.hpp"
+
+namespace urban_gnss {
+
+using Level = PipelineEvent::Level;
+
+namespace {
+
+/// Standard deviation below which a heading tells forwards from backwards.
+constexpr double kKnownHeading_rad = 0.15;
+/// Share of a speed over ground by which the robot moves sideways.
+constexpr double kSideways = 0.1;
+
+}  // namespace
+
+void LocalizationPipeline::add_odometry(const OdometrySample& message) {
+  const std::string fault = OdometrySource::fault_of(message);
+  if (!fault.empty()) {
+    event(Level::kWarn, "odometry left out: " + fault);
+    return;
+  }
+  if (!is_new(InputStream::kOdometry, message.stamp)) return;
+  offsets_.add_odometry(message.stamp, events_);
+  const OdometrySample sample = odometry_.resolve(message, events_);
+  if (odometry_.has_changed()) change_odometry();
+
+  const Stamp since = history_.empty() ? sample.stamp : history_.latest();
+  const double elapsed_s = to_seconds(sample.stamp - since);
+  Twist2 twist = yaw_rate_.twist_of(sample, since, events_);
+  speed_.set_wheels_contradicted(yaw_rate_.contradicts_wheels());
+  twist.speed_mps = speed_.speed_of(twist.speed_mps, sample.stamp, elapsed_s, events_);
+  if (elapsed_s > parameters_.input.stamps.odometry_gap) forget_odometry(elapsed_s);
+  history_.add(sample.stamp, twist);
+  if (initialized() && elapsed_s > 0.0) {
+    localizer_->move(twist, elapsed_s);
+    const MotionDoubt doubt{speed_.doubt_m2(), yaw_rate_.doubt_rad2()};
+    if (doubt.exists()) localizer_->doubt(doubt);
+    guard_against_non_finite();
+  }
+  if (!initialized() && start_.given() && frame()) start_from(told(*start_.given(), "the given pose"));
+  process_velocities();
+  process_fixes();
+  if (initialized()) outputs_.push_back({sample.stamp, estimate(), sample.pose, twist});
+}
+
+void LocalizationPipeline::change_odometry() {
+  speed_.expect_jump();
+  delay_.forget_odometry();
+  const MotionDoubt doubt = odometry_.doubt();
+  if (!doubt.exists()) return;
+  if (initialized()) {
+    localizer_->doubt(doubt);
+  } else {
+    start_.lose_place();  // what was found until now is of another motion
+  }
+}
+
+void LocalizationPipeline::forget_odometry(double gap_s) {
+  event(Level::kWarn, "no odometry for " + seconds_text(gap_s) +
+                          (initialized() ? ": place unknown, starting anew from the fixes" : ""));
+  history_.clear();
+  delay_.forget_odometry();
+  ++epoch_;
+  start_.lose_place();
+}
+
+void LocalizationPipeline::add_imu(const ImuSample& sample) {
+  if (sample.rate_radps.allFinite()) add_imu_rate(imu_.yaw_rate(sample));
+}
+
+void LocalizationPipeline::add_imu_yaw_rate(Stamp stamp, double yaw_rate_radps) {
+  add_imu_rate({stamp, yaw_rate_radps, {}, std::abs(yaw_rate_radps)});
+}
+
+void LocalizationPipeline::add_imu_rate(const ImuYawRate& rate) {
+  if (!parameters_.imu.use_imu_yaw_rate || !std::isfinite(rate.told_radps)) return;
+  offsets_.add(InputStream::kImu, rate.stamp);
+  if (is_far_ahead(rate.stamp)) {
+    if (!std::exchange(said_far_imu_, true)) {
+      event(Level::kWarn, "yaw rate of the IMU left out: " + far_ahead(rate.stamp));
+    }
+    return;
+  }
+  if (is_new(InputStream::kImu, rate.stamp)) yaw_rate_.add(rate);
+}
+
+void LocalizationPipeline::add_velocity(const RawVelocity& velocity) {
+  if (!takes_velocity()) return;
+  std::string fault = velocity_fault(velocity);
+  offsets_.add(InputStream::kVelocities, velocity.stamp);
+  if (fault.empty() && is_far_ahead(velocity.stamp)) fault = far_ahead(velocity.stamp);
+  if (fault.empty() && !is_new(InputStream::kVelocities, velocity.stamp)) fault = "not newer than the last";
+  if (!fault.empty()) {
+    event(Level::kWarn, "velocity of the receiver left out: " + fault);
+    return;
+  }
+  velocities_.add(velocity);
+  process_velocities();
+}
+
+void LocalizationPipeline::process_velocities() {
+  if (history_.empty()) return;
+  while (const auto velocity = velocities_.take(history_.latest())) process_velocity(*velocity);
+}
+
+void LocalizationPipeline::process_velocity(const RawVelocity& velocity) {
+  RawVelocity in_time = velocity;
+  in_time.stamp = undelayed(velocity.stamp);
+  const Eigen::Matrix2d to_map = Eigen::Rotation2Dd(convergence_rad()).toRotationMatrix();
+  in_time.velocity = to_map * velocity.velocity;
+  in_time.covariance = to_map * velocity.covariance * to_map.transpose();
+  const auto matched = match_velocity(in_time, history_, antenna_);
+  if (!matched) {
+    event(Level::kWarn, "velocity of the receiver left out: older than the odometry that is remembered");
+    return;
+  }
+  start_.add_velocity(matched->pair);
+  odometry_.add_velocity(in_time.stamp, in_time.velocity, events_);
+  compare_speed(*matched);
+  if (!initialized() || !localizer_->takes_velocity()) return;
+  localizer_->correct_velocity(matched->measurement);
+  reporter_.count_velocity();
+  guard_against_non_finite();
+}
+
+void LocalizationPipeline::compare_speed(const MatchedVelocity& velocity) {
+  const Eigen::Vector2d& measured = velocity.measurement.velocity;
+  const double lateral_mps = history_.twist_at(velocity.pair.stamp)->lateral_mps;
+  const bool is_sideways = std::abs(lateral_mps) > kSideways * measured.norm();
+  ReceiverSpeed speed;
+  speed.stamp = velocity.pair.stamp;
+  speed.speed_mps = measured.norm();
+  speed.sigma_mps = std::sqrt(0.5 * velocity.measurement.covariance.trace());
+  if (initialized() && localizer_->health().heading_sigma_rad < kKnownHeading_rad) {
+    const double turned = velocity.pair.yaw_rad - history_.pose_at(history_.latest())->yaw;
+    const double yaw = localizer_->pose().yaw + turned;
+    speed.forward_mps = measured.x() * std::cos(yaw) + measured.y() * std::sin(yaw);
+    if (is_sideways) speed.speed_mps = std::abs(*speed.forward_mps);
+  } else if (is_sideways) {
+    return;  // how much of it is forwards is not known
+  }
+  speed_.compare(speed, events_);
+}
+
+}  // namespace urban_gnss

@@ -1,0 +1,77 @@
+#include "urban_gnss_localization/ros/sensor_frames.hpp"
+
+#include <sstream>
+
+#include "urban_gnss_localization/ros/topics.hpp"
+
+namespace urban_gnss {
+
+using Level = PipelineEvent::Level;
+
+void SensorFrames::observe_odometry(const std::string& frame, const std::string& child_frame) {
+  if (has_odometry_) return;
+  has_odometry_ = true;
+  const auto compare = [this](const char* field, const std::string& told, const char* parameter,
+                              const std::string& expected, const std::string& effect) {
+    if (told.empty() || told == expected) return;
+    say(Level::kWarn,
+        std::string("odometry: ") + field + " is '" + told + "', " + parameter + " is '" + expected + "': " + effect);
+  };
+  const std::string& odom = frames_.odom;
+  compare("header.frame_id", without_leading_slash(frame), "odom_frame", odom,
+          "map -> " + odom + " is broadcast, and is of no use where " + odom + " is not in tf");
+  compare("child_frame_id", without_leading_slash(child_frame), "base_link_frame", frames_.base_link,
+          "the estimate is that of " + without_leading_slash(child_frame));
+}
+
+void SensorFrames::observe(Sensor& sensor, const std::string& frame) {
+  if (sensor.was_heard && sensor.frame == frame) return;
+  sensor = {frame, true, !frame.empty() && frame != frames_.base_link, false};
+}
+
+void SensorFrames::observe_fix(const std::string& frame) {
+  const bool is_first = !antenna_.was_heard;
+  if (!wants_antenna_) return;
+  observe(antenna_, without_leading_slash(frame));
+  if (is_first && antenna_.frame.empty()) {
+    say(Level::kWarn,
+        "fixes have no frame_id: the antenna is taken to be at the base; set antenna_offset if it is elsewhere");
+  }
+}
+
+void SensorFrames::observe_imu(const std::string& frame) { observe(imu_, without_leading_slash(frame)); }
+
+void SensorFrames::look_up(const tf2::BufferCore& tf, LocalizationPipeline& pipeline) {
+  const auto found = [&](Sensor& sensor) {
+    if (!sensor.is_missing || !tf.canTransform(frames_.base_link, sensor.frame, ros::Time(0))) return false;
+    sensor.is_missing = false;
+    return true;
+  };
+  if (found(antenna_)) {
+    const auto offset = tf.lookupTransform(frames_.base_link, antenna_.frame, ros::Time(0)).transform.translation;
+    pipeline.set_antenna_offset({offset.x, offset.y});
+    std::ostringstream text;
+    text << "antenna at x " << offset.x << " m, y " << offset.y << " m in " << frames_.base_link;
+    say(Level::kInfo, text.str());
+  }
+  if (found(imu_)) {
+    const auto q = tf.lookupTransform(frames_.base_link, imu_.frame, ros::Time(0)).transform.rotation;
+    pipeline.set_imu_mounting(Eigen::Quaterniond(q.w, q.x, q.y, q.z).normalized());
+  }
+}
+
+void SensorFrames::complain() {
+  if (antenna_.is_missing && !antenna_.was_complained_of) {
+    antenna_.was_complained_of = true;
+    say(Level::kWarn, "no tf from " + frames_.base_link + " to the fix's frame " + antenna_.frame +
+                          ": the antenna is taken to be at the base until there is one");
+  }
+  if (imu_.is_missing && !imu_.was_complained_of) {
+    imu_.was_complained_of = true;
+    say(Level::kInfo,
+        "no tf from " + frames_.base_link + " to the IMU's frame " + imu_.frame +
+            ": where it tells no orientation, its z axis is taken to be up until turning tells otherwise");
+  }
+}
+
+}  // namespace urban_gnss

@@ -1,0 +1,61 @@
+#include <gtest/gtest.h>
+
+#include "urban_gnss_localization/parameters/parameter_reader.hpp"
+#include "urban_gnss_localization/parameters/params_file.hpp"
+
+namespace urban_gnss {
+namespace {
+
+ParamsFileFindings look(const std::string& yaml) { return look_through_params(YAML::Load(yaml), "imm_ekf"); }
+
+TEST(ParamsFile, SectionsOfNodesAreFine) {
+  for (const char* yaml : {"imm_ekf: {direct_sigma: 4}", "{imm_ekf: {direct_sigma: 4}, ukf: {expert: {}}}",
+                           "/imm_ekf/direct_sigma: 4", "/robot1: {imm_ekf: {direct_sigma: 4}}"}) {
+    const auto found = look(yaml);
+    EXPECT_TRUE(found.faults.empty()) << yaml << ": " << found.faults[0];
+    EXPECT_EQ(found.hint, "") << yaml;
+  }
+}
+
+TEST(ParamsFile, WhatNobodyReadsIsRefused) {
+  const std::pair<const char*, const char*> cases[] = {
+      {"{direct_sigma: 4, antenna_offset: [0.1, 0]}", "direct_sigma stands outside of a section"},
+      {"imm_ekf_node: {direct_sigma: 4}", "the node is called imm_ekf"},
+      {"{imm_ekf: {direct_sigma: 4}, publish_tf: false}", "publish_tf stands outside"},
+      {"expert: {imu: {use_imu_yaw_rate: false}}", "expert stands outside"},
+      {"[1, 2]", "must be a map"},
+      {"", "must be a map"}};
+  for (const auto& [yaml, fault] : cases) {
+    const auto found = look(yaml);
+    ASSERT_FALSE(found.faults.empty()) << yaml;
+    EXPECT_NE(found.faults[0].find(fault), std::string::npos) << found.faults[0];
+  }
+  EXPECT_EQ(look("{direct_sigma: 4, antenna_offset: [0.1, 0]}").faults.size(), 2u);
+}
+
+TEST(ParamsFile, OneThatIsOfOtherNodesIsAHint) {
+  const auto found = look("ukf: {direct_sigma: 4}");
+  EXPECT_TRUE(found.faults.empty());
+  EXPECT_NE(found.hint.find("no section imm_ekf"), std::string::npos);
+}
+
+struct WithList {
+  std::vector<double> datum;
+  void visit(ParameterVisitor& v) { v("datum", datum, "deg, deg, m", "a list"); }
+};
+
+TEST(ParameterReader, TextThatIsAListIsAList) {
+  WithList parameters;
+  ParameterReader reader(YAML::Load("datum: '[48.1374, 11.5755, 520.0]'"));
+  reader.read(parameters);
+  EXPECT_TRUE(reader.finish().empty());
+  EXPECT_EQ(parameters.datum, (std::vector<double>{48.1374, 11.5755, 520.0}));
+  for (const char* bad : {"'[48.1, north]'", "north", "'48.1'", "'[1, .nan]'"}) {
+    ParameterReader refusing(YAML::Load(std::string("datum: ") + bad));
+    refusing.read(parameters);
+    EXPECT_EQ(refusing.finish().size(), 1u) << bad;
+  }
+}
+
+}  // namespace
+}  // namespace urban_gnss
