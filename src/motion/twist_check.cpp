@@ -44,16 +44,18 @@ double left_by(double pose_square, double twist_square, double product, double f
 
 }  // namespace
 
-void TwistCheck::add(const Pose2& from, const Pose2& to, const Twist2& twist, double duration_s) {
+void TwistCheck::add(const Pose2& from, const Pose2& to, const Twist2& before, const Twist2& twist, double duration_s) {
   look_for_zero(from, to, twist, duration_s);
   const double turn = angle_difference(to.yaw, from.yaw);
-  const Vector told(twist.speed_mps * duration_s, twist.lateral_mps * duration_s);
+  // Between slow messages the twist changes: its mean is that of both.
+  const Vector told(0.5 * (before.speed_mps + twist.speed_mps) * duration_s,
+                    0.5 * (before.lateral_mps + twist.lateral_mps) * duration_s);
   block_.duration_s += duration_s;
   block_.by_pose += Vector(to.x - from.x, to.y - from.y);
   block_.by_twist += std::polar(1.0, from.yaw + 0.5 * turn) * told;
   block_.by_fixed_twist += told;
   block_.pose_turn += turn;
-  block_.twist_turn += twist.yaw_rate_radps * duration_s;
+  block_.twist_turn += 0.5 * (before.yaw_rate_radps + twist.yaw_rate_radps) * duration_s;
   if (block_.duration_s >= kBlock_s) close_block();
 }
 
@@ -146,7 +148,9 @@ std::optional<TwistFinding> judge_turn(const Window& w) {
 }  // namespace
 
 void TwistCheck::Verdict::judge(TwistFinding found) {
-  if (found.is_same_as(last)) {
+  // A fault that has a name is not taken back for want of one.
+  const bool is_vaguer = found.fault == TwistFault::kUnexplained && fault.fault != TwistFault::kNone;
+  if (found.is_same_as(last) && !is_vaguer) {
     fault = found;
     has_agreed = found.fault == TwistFault::kNone;
   }

@@ -86,7 +86,7 @@ void LocalizationPipeline::add_imu_rate(const ImuYawRate& rate) {
   offsets_.add(InputStream::kImu, rate.stamp);
   if (is_far_ahead(rate.stamp)) {
     if (!std::exchange(said_far_imu_, true)) {
-      event(Level::kWarn, "yaw rate of the IMU left out: " + far_ahead(rate.stamp));
+      event(Level::kWarn, "yaw rate of the IMU left out: " + far_ahead(InputStream::kImu));
     }
     return;
   }
@@ -97,7 +97,7 @@ void LocalizationPipeline::add_velocity(const RawVelocity& velocity) {
   if (!takes_velocity()) return;
   std::string fault = velocity_fault(velocity);
   offsets_.add(InputStream::kVelocities, velocity.stamp);
-  if (fault.empty() && is_far_ahead(velocity.stamp)) fault = far_ahead(velocity.stamp);
+  if (fault.empty() && is_far_ahead(velocity.stamp)) fault = far_ahead(InputStream::kVelocities);
   if (fault.empty() && !is_new(InputStream::kVelocities, velocity.stamp)) fault = "not newer than the last";
   if (!fault.empty()) {
     event(Level::kWarn, "velocity of the receiver left out: " + fault);

@@ -72,9 +72,9 @@ void LocalizationPipeline::note_unset_stamp(InputStream stream, Stamp stamp) {
   event(Level::kWarn, std::string("header.stamp of ") + to_string(stream) + " is 0: its driver must set it");
 }
 
-std::string LocalizationPipeline::far_ahead(Stamp stamp) const {
-  return "more than " + seconds_text(kMaxAhead_s) + " ahead of the odometry" +
-         clock_hint(to_seconds(stamp - history_.latest()));
+std::string LocalizationPipeline::far_ahead(InputStream stream) const {
+  const auto offset_s = offsets_.offset_s(stream);  // nothing where the odometry is what is missing
+  return "more than " + seconds_text(kMaxAhead_s) + " ahead of the odometry" + (offset_s ? clock_hint(*offset_s) : "");
 }
 
 bool LocalizationPipeline::is_far_ahead(Stamp stamp) const {
@@ -120,7 +120,7 @@ void LocalizationPipeline::add_fix(const RawFix& fix) {
   if (is_far_ahead(fix.stamp)) {
     FixOutcome outcome;
     outcome.stamp = fix.stamp;
-    decide_stale(std::move(outcome), far_ahead(fix.stamp));
+    decide_stale(std::move(outcome), far_ahead(InputStream::kFixes));
     return;
   }
   // A receiver that does not know where it is may not know the time either, and a stamp that was not set is no time.
@@ -162,8 +162,8 @@ bool LocalizationPipeline::process_next_fix() {
   if (const auto news = delay_.take_news()) event(Level::kInfo, *news);
   odometry_.add_fix(undelayed(fix.fix.stamp), fix.fix.position, events_);
   if (is_too_old) {
-    const double behind_s = to_seconds(history_.latest() - undelayed(fix.fix.stamp));
-    decide_stale(fix.outcome, "older than the odometry that is remembered" + clock_hint(-behind_s));
+    const auto offset_s = offsets_.offset_s(InputStream::kFixes);
+    decide_stale(fix.outcome, "older than the odometry that is remembered" + (offset_s ? clock_hint(*offset_s) : ""));
     return true;
   }
   if (!initialized()) {

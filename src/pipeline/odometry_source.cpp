@@ -147,7 +147,7 @@ OdometrySample OdometrySource::resolve(const OdometrySample& told, std::vector<P
   if (told.has_pose) {
     if (last_ && duration_s > 0.0) by_pose = increment(told, duration_s, events);
     if (by_pose && told.has_twist) {
-      check_.add(last_->pose, told.pose, told.twist, duration_s);
+      check_.add(last_->pose, told.pose, last_->has_twist ? last_->twist : told.twist, told.twist, duration_s);
       witness_.add_step(told.stamp, *by_pose, has_twist ? told.twist : Twist2{});
       watch(events);
     }
@@ -169,7 +169,7 @@ OdometrySample OdometrySource::resolve(const OdometrySample& told, std::vector<P
   const bool is_by_pose = by_increment && !is_slow;
   has_changed_ = last_ && is_by_pose != was_by_pose_;
   was_by_pose_ = is_by_pose;
-  if (!told.has_pose && last_) resolved.pose = move(last_->pose, resolved.twist, duration_s);
+  if (!told.has_pose) resolved.pose = last_ ? move(last_->pose, resolved.twist, duration_s) : Pose2{};
   last_ = told;
   last_->pose = resolved.pose;
   return resolved;

@@ -49,6 +49,8 @@ void StreamOffsets::add(InputStream stream, Stamp stamp) {
 }
 
 void StreamOffsets::add_odometry(Stamp stamp, std::vector<PipelineEvent>& events) {
+  const double interval_s = last_odometry_ ? to_seconds(stamp - *last_odometry_) : 0.0;
+  last_odometry_ = stamp;
   for (std::size_t i = 0; i < kStreams; ++i) {
     Stream& each = streams_[i];
     if (!each.newest) continue;
@@ -61,7 +63,7 @@ void StreamOffsets::add_odometry(Stamp stamp, std::vector<PipelineEvent>& events
     const bool was_off = each.off_s.has_value();
     if (*least > kAhead_s) {
       each.off_s = *least;
-    } else if (*most < -behind_s(stream)) {
+    } else if (*most < -behind_s(stream) - interval_s) {
       each.off_s = *most;
     } else {
       each.off_s.reset();

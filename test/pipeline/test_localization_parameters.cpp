@@ -69,7 +69,11 @@ std::string trace_of_faults(const std::string& changes) {
     OdometrySample sample = Rig::odometry(time);
     if (k == 100) rig.fake->state.pose.y += 40.0;
     if (k == 700) sample.twist.speed_mps = 100.0;
-    if (k > 800) sample.twist.speed_mps = 0.0;
+    if (k > 800) {
+      const Pose2 there = Rig::odometry(80.0).pose;
+      sample.twist.speed_mps = 0.0;
+      sample.pose = {there.x, there.y, sample.pose.yaw};
+    }
     rig.pipeline.add_odometry(sample);
     const LocalizationReport report = rig.pipeline.report();
     out << report.healthy << report.position_sigma_m << ' ' << rig.fake->state.pose.x << '\n';

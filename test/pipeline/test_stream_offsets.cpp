@@ -24,6 +24,7 @@ TEST(StreamOffsets, SaysNothingOfClocksThatAgree) {
   for (const double odometry_hz : {1.0, 20.0, 200.0}) {
     for (const auto& [stream, late_s, stream_hz] : {std::tuple{InputStream::kImu, 0.01, 100.0},
                                                     {InputStream::kImu, 0.2, 10.0},
+                                                    {InputStream::kImu, 0.0, 1.0},
                                                     {InputStream::kFixes, 1.5, 1.0},
                                                     {InputStream::kFixes, 0.0, 10.0},
                                                     {InputStream::kVelocities, 0.8, 5.0}}) {

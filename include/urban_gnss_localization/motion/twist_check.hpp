@@ -39,9 +39,9 @@ struct TwistFinding {
 /// contradiction nothing changes: scales that differ by a fifth, a twist that is smoothed, a pose from another sensor.
 class TwistCheck {
  public:
-  /// One step of an odometry that has both: from pose to pose, with the twist of the message that ends it. Requires
+  /// One step of an odometry that has both: from pose to pose, with the twists of both messages. Requires
   /// duration_s > 0, finite numbers and no jump of the pose.
-  void add(const Pose2& from, const Pose2& to, const Twist2& twist, double duration_s);
+  void add(const Pose2& from, const Pose2& to, const Twist2& before, const Twist2& twist, double duration_s);
   /// The pose jumped: what goes before it is not compared with what comes after it.
   void break_off() { block_ = {}; }
 
@@ -74,6 +74,7 @@ class TwistCheck {
     double zero_s{0.0};  ///< for which the twist has been exactly 0
     Vector at_zero;      ///< m or rad by the pose, since it has been 0 for a second
 
+    explicit Verdict(bool is_of_yaw_rate) { last.is_of_yaw_rate = fault.is_of_yaw_rate = is_of_yaw_rate; }
     void judge(TwistFinding found);
   };
 
@@ -81,8 +82,8 @@ class TwistCheck {
   void look_for_zero(const Pose2& from, const Pose2& to, const Twist2& twist, double duration_s);
 
   Block block_;
-  Verdict speed_;
-  Verdict turn_{{}, {TwistFault::kNone, true}, {TwistFault::kNone, true}};
+  Verdict speed_{false};
+  Verdict turn_{true};
 };
 
 }  // namespace urban_gnss

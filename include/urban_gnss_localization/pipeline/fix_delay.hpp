@@ -39,7 +39,7 @@ struct DelayEstimate {
 /// noise of each window is what the best fit leaves in it; a window full of reflections so says little.
 class DelaySearch {
  public:
-  static constexpr std::size_t kCandidates = 36;  ///< up to 3.5 s
+  static constexpr std::size_t kCandidates = 26;
   static constexpr double kStep_s = 0.1;
   using Vectors = std::array<std::complex<double>, kCandidates>;
 

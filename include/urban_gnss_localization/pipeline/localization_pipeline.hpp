@@ -117,8 +117,8 @@ class LocalizationPipeline {
   void note_unset_stamp(InputStream stream, Stamp stamp);
   /// Whether the stamp is farther ahead of the odometry than any delay explains.
   bool is_far_ahead(Stamp stamp) const;
-  /// Why it cannot be used, then.
-  std::string far_ahead(Stamp stamp) const;
+  /// Why a message of the stream cannot be used, then.
+  std::string far_ahead(InputStream stream) const;
   void forget_odometry(double gap_s);
   /// The odometry is moved by another part of its messages from now on.
   void change_odometry();

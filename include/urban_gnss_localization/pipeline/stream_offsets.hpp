@@ -17,8 +17,8 @@ std::string clock_hint(double offset_s);
 
 /// Compares the newest stamps of the streams as their messages come: what comes together should be of about the same
 /// time. A stream that is ahead of the odometry by half a second and more has another clock (no message comes before it
-/// was measured), and so has an IMU that is behind; fixes and velocities may be late by 2.5 s. Only the order of the
-/// messages counts, so that live and offline see the same.
+/// was measured), and so has an IMU that is behind the step before; fixes and velocities may be late by 2.5 s. Only the
+/// order of the messages counts, so that live and offline see the same.
 class StreamOffsets {
  public:
   /// A message of a stream other than the odometry came.
@@ -40,6 +40,7 @@ class StreamOffsets {
   };
   static constexpr std::size_t kStreams = static_cast<std::size_t>(InputStream::kEstimates) + 1;
   std::array<Stream, kStreams> streams_;
+  std::optional<Stamp> last_odometry_;
 };
 
 }  // namespace urban_gnss
