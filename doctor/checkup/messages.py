@@ -54,7 +54,7 @@ def imu(message, received):
 def satellites(message, received):
     """urban_gnss_localization/SatelliteArray."""
     all_of = message.satellites
-    return (seconds(message.header.stamp), received, len(all_of), sum(1 for each in all_of if each.tracked),
+    return (seconds(message.header.stamp), received, len(all_of), sum(1 for each in all_of if each.cn0 > 0.0),
             sum(1 for each in all_of if each.cn0 >= STRONG_DBHZ),
             sum(1 for each in all_of if math.isfinite(each.azimuth) and math.isfinite(each.elevation)),
             sum(1 for each in all_of if math.isfinite(each.pseudorange_residual)))
@@ -62,9 +62,9 @@ def satellites(message, received):
 
 def nav_sat(message, received):
     """ublox_msgs/NavSAT, which has no header: the time of its receipt stands for its stamp."""
-    tracked = [each for each in message.sv if each.cno > 0]
-    return (received, received, len(message.sv), len(tracked), sum(1 for each in tracked if each.cno >= STRONG_DBHZ),
-            sum(1 for each in tracked if abs(each.elev) <= 90), sum(1 for each in tracked if each.prRes != 0))
+    heard = [each for each in message.sv if each.cno > 0]
+    return (received, received, len(message.sv), len(heard), sum(1 for each in heard if each.cno >= STRONG_DBHZ),
+            sum(1 for each in heard if abs(each.elev) <= 90), sum(1 for each in heard if each.prRes != 0))
 
 
 def gps_status(message, received):

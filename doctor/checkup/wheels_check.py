@@ -9,7 +9,7 @@ from .units import SPEED_UNITS, name_of
 
 SCALE_WARN, SCALE_FAIL = 0.03, 0.25   # wheels of good recordings are off by up to 8 %
 GOOD_FIT = 0.3             # of a window's extent that is left, for its scale to count
-LEAST_SCALES = 4
+LEAST_SCALES = 3
 SURE = 3.0                 # standard errors
 MOVING_MPS = 0.7           # of the receiver's velocity: noise and reflections give less at rest
 DEAD_SHARE = 0.1           # of the receiver's speed: the wheels stand
@@ -37,8 +37,9 @@ def scales_by_fixes(evidence):
     if not parts:
         return np.empty(0)
     reading = motion_fit.read("", "", track, t, q, parts)
-    # The better half: straight, and with few reflections.
-    good = reading.left < min(GOOD_FIT, signals.median(reading.left) * 1.0001)
+    good = reading.left < GOOD_FIT
+    if np.sum(good) >= 8:  # the better half: straight, and with few reflections
+        good &= reading.left <= signals.median(reading.left)
     return reading.scale[good]
 
 

@@ -1,0 +1,39 @@
+"""All checks of a recording, in the order in which a person would ask."""
+
+import traceback
+
+from . import (antenna_check, clocks_check, covariance_check, fix_check, frames_check, imu_check, odometry_check,
+               satellites_check, stamps_check, topics_check, velocity_check, wheels_check, yaw_check)
+from .evidence import Evidence
+from .finding import FAIL, LEVELS, WARN, warned
+
+# yaw_check finds which yaw rate is to be believed, and is needed by those after it.
+ORDER = (topics_check, stamps_check, frames_check, imu_check, odometry_check, yaw_check, clocks_check, wheels_check,
+         velocity_check, fix_check, covariance_check, antenna_check, satellites_check)
+
+
+def examine(recording, setup, report=lambda name: None):
+    """All findings. A check that stumbles over odd data says so and does not keep the others from their work."""
+    evidence = Evidence(recording, setup)
+    findings = []
+    for module in ORDER:
+        name = module.__name__.split(".")[-1][:-len("_check")]
+        report(name)
+        try:
+            findings += module.check(evidence)
+        except (ArithmeticError, IndexError, ValueError) as error:
+            place = traceback.extract_tb(error.__traceback__)[-1]
+            findings.append(warned(name + ".check", "these data cannot be checked ({}:{}: {})".format(
+                place.filename.split("/")[-1], place.lineno, error), "please report it with the bag"))
+    return gravest(findings), evidence
+
+
+def gravest(findings):
+    """Where a check has spoken more than once, what it passed is left out beside what it did not."""
+    bad = {finding.check for finding in findings if finding.level in (WARN, FAIL)}
+    return [finding for finding in findings if finding.level in (WARN, FAIL) or finding.check not in bad]
+
+
+def count(findings):
+    """How many of each level."""
+    return {level: sum(1 for finding in findings if finding.level == level) for level in LEVELS}

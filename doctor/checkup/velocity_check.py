@@ -1,0 +1,158 @@
+"""The receiver's velocity against its own fixes: east and north, in m/s, not in the robot's frame."""
+
+import numpy as np
+
+from . import fits, motion_fit, signals
+from .evidence import LEAST_WAY_M
+from .finding import failed, passed, warned
+from .units import SPEED_UNITS, name_of
+
+LEAST_WINDOWS = 4
+CONCENTRATED = 0.8         # length of the mean direction of the windows' rotations
+TURNED_RAD = 0.35          # east and north are not where they should be; good receivers have less than 0.1
+GOOD_LEFT = 0.5            # of the extent that is left, at the most, for the fixes to say anything
+GAIN, SURE = 0.4, 2.5      # of another reading, as in motion_fit
+BODY_SHARE = 0.15          # of the speed that is to the side, at the most, in the robot's own frame
+SCALE_WITHIN = 0.2
+
+
+def check(evidence):
+    """All findings of this family."""
+    velocity = evidence.recording.velocity
+    if velocity is None or len(velocity) < fits.LEAST_POINTS or evidence.velocities is None:
+        return []
+    return not_finite(velocity) + still(evidence) + directions(evidence) + declared(velocity)
+
+
+def not_finite(velocity):
+    """Messages with NaN or infinity."""
+    bad = int(np.sum(~np.isfinite(velocity.vx + velocity.vy)))
+    if not bad:
+        return []
+    return [warned("velocity.finite", "{}: {} of {} velocities are not finite and left out".format(
+        velocity.topic, bad, len(velocity)), "nothing, if they are those without a fix", count=bad)]
+
+
+def still(evidence):
+    """A velocity that is always zero."""
+    _, values = evidence.velocities
+    if np.max(np.abs(values)) > 1e-6:
+        return []
+    topic = evidence.recording.velocity.topic
+    if evidence.odometry_way() > LEAST_WAY_M:
+        return [failed("velocity.zero", "{}: always zero, though the robot drives".format(topic),
+                       "velocity_topic:= of the receiver's Doppler velocity; leave it out rather")]
+    return [warned("velocity.zero", "{}: always zero".format(topic), "drive some metres")]
+
+
+def integrated(t, velocity):
+    """The velocity as a track, whose frame is that of the velocity."""
+    return fits.Track(t, velocity, np.zeros(len(t)))
+
+
+def directions(evidence):
+    """Where the fixes go, seen from where the velocity points."""
+    name, topic = "velocity.frame", evidence.recording.velocity.topic
+    if evidence.fixes is None:
+        return []
+    vt, velocity = evidence.velocities
+    usual = np.percentile(np.abs(velocity), 95)
+    keep = np.abs(velocity) <= 3.0 * usual + 1.0
+    vt, velocity = vt[keep], velocity[keep]
+    t, q, _ = evidence.fixes
+    track = integrated(vt, velocity)
+    parts = [part for part in motion_fit.useful_windows(track, t, q, vt) if motion_fit.extent(q[part]) > 0.25 * LEAST_WAY_M]
+    if len(parts) < LEAST_WINDOWS:
+        return [passed(name, "{}: too little driving to compare it with the fixes".format(topic))]
+    plain = motion_fit.read("as it is", "velocity", track, t, q, parts)
+    mirrored = motion_fit.read("mirrored", "velocity", integrated(vt, np.conj(velocity)), t, q, parts)
+    body = body_reading(evidence, vt, velocity, t, q, parts)
+    values = dict(left=signals.median(plain.left))
+    if body is not None and motion_fit.gain(body, plain)[0] > GAIN and motion_fit.gain(body, plain)[1] > SURE:
+        return [failed(name, "{}: it is in the robot's own frame (x forward), not east and north: {:.0f} % of it is to the "
+                       "side, and the fixes go elsewhere".format(topic, 100.0 * side_share(velocity)),
+                       "localization.launch velocity_topic:= of a velocity in east and north (ENU)",
+                       side_share=side_share(velocity), **values)]
+    size, sure = motion_fit.gain(mirrored, plain)
+    if size > GAIN and sure > SURE:
+        return [mirrored_finding(evidence, name, topic, values)]
+    if values["left"] > GOOD_LEFT:
+        return [passed(name, "{}: the fixes are too rough to compare it with".format(topic), **values)]
+    return turned(name, topic, plain, values) + units(topic, plain)
+
+
+def side_share(velocity):
+    """Median of the part to the side (y) in the speed."""
+    speed = np.abs(velocity)
+    moving = speed > max(0.3, 0.2 * np.percentile(speed, 90))
+    return signals.median(np.abs(velocity.imag[moving]) / speed[moving]) if moving.any() else 1.0
+
+
+def body_reading(evidence, vt, velocity, t, q, parts):
+    """The velocity turned by the robot's heading, as it must be if it is in the robot's frame; None if it cannot be."""
+    track = evidence.track()
+    if side_share(velocity) > BODY_SHARE or track is None:
+        return None
+    turned_velocity = velocity * np.exp(1j * track.yaw_at(vt))
+    return motion_fit.read("robot's frame", "velocity", integrated(vt, turned_velocity), t, q, parts)
+
+
+def mirrored_finding(evidence, name, topic, values):
+    """East and north are swapped: in the velocity, or in the fixes. The odometry knows."""
+    if fixes_mirrored(evidence):
+        return passed(name, "{}: a mirror image of the fixes, which are the wrong ones".format(topic), **values)
+    return failed(name, "{}: a mirror image of where the fixes go: x is north and y is east (NED)".format(topic),
+                  "localization.launch velocity_topic:= of a velocity with x east and y north (ENU)", **values)
+
+
+def fixes_mirrored(evidence):
+    """Whether the odometry too finds the fixes mirrored."""
+    track = evidence.track()
+    if track is None or evidence.fixes is None:
+        return False
+    t, q, _ = evidence.fixes
+    parts = motion_fit.most_turning(track, t, motion_fit.useful_windows(track, t, q, track.t))
+    plain = motion_fit.read("", "", track, t, q, parts)
+    other = motion_fit.read("", "", track, t, np.conj(q), parts)
+    return motion_fit.clearly_better(other, plain)
+
+
+def turned(name, topic, plain, values):
+    """A constant angle between the velocity and the way of the fixes."""
+    good = plain.left < GOOD_LEFT
+    mean = np.mean(np.exp(1j * plain.rotation[good]))
+    angle = float(np.angle(mean))
+    values = dict(values, angle_rad=angle, concentration=float(abs(mean)))
+    if abs(mean) < CONCENTRATED:
+        return [warned(name, "{}: fixes move in other directions than it says, each time another".format(topic),
+                       "is it in the robot's frame, or smoothed? velocity_topic:= of one in east and north", **values)]
+    if abs(angle) < TURNED_RAD:
+        return [passed(name, "{}: east and north, as the fixes move".format(topic), **values)]
+    what = "reversed" if abs(angle) > 2.8 else "turned by {:.0f} degrees".format(np.degrees(angle))
+    return [failed(name, "{}: {} against where the fixes go".format(topic, what),
+                   "velocity_topic:= of a velocity with x east and y north, not in the frame of odometry or robot",
+                   **values)]
+
+
+def units(topic, plain):
+    """Its size by the fixes."""
+    good = plain.left < 0.3
+    if np.sum(good) < LEAST_WINDOWS:
+        return []
+    factor = 1.0 / signals.median(plain.scale[good])
+    error = signals.robust_sigma(plain.scale[good]) / np.sqrt(np.sum(good))
+    unit = name_of(factor, SPEED_UNITS[:10])
+    values = dict(velocity_over_fixes=factor)
+    if abs(np.log(factor)) > max(np.log(1.0 + SCALE_WITHIN), 3.0 * error):
+        return [(failed if unit else warned)("velocity.speed", "{}: {:.3g} times as fast as the fixes move{}".format(
+            topic, factor, ": " + unit if unit else ""), "in the driver: m/s", **values)]
+    return [passed("velocity.speed", "{}: {:.3f} times as fast as the fixes move".format(topic, factor), **values)]
+
+
+def declared(velocity):
+    """Its covariance."""
+    covariance = velocity.cov_xx[np.isfinite(velocity.cov_xx)]
+    if len(covariance) and np.all(covariance <= 0.0):
+        return [warned("velocity.covariance", "{}: declares no covariance; 0.3 m/s is taken".format(velocity.topic),
+                       "imm_ekf: {expert: {velocity: {velocity_sigma_default: 0.3}}}  # what it has, if you know")]
+    return []
