@@ -2,19 +2,21 @@
 
 import traceback
 
-from . import (antenna_check, clocks_check, covariance_check, fix_check, frames_check, imu_check, odometry_check,
-               satellites_check, stamps_check, topics_check, velocity_check, wheels_check, yaw_check)
+from . import (antenna_check, clocks_check, covariance_check, fix_check, frames_check, imu_check, motion_fit,
+               odometry_check, satellites_check, stamps_check, topics_check, velocity_check, wheels_check, yaw_check)
 from .evidence import Evidence
 from .finding import FAIL, LEVELS, WARN, warned
 
-# yaw_check finds which yaw rate is to be believed, and is needed by those after it.
-ORDER = (topics_check, stamps_check, frames_check, imu_check, odometry_check, yaw_check, clocks_check, wheels_check,
-         velocity_check, fix_check, covariance_check, antenna_check, satellites_check)
+# What a check finds wrong is put right in the evidence where that can be done, so that those after it do not complain of
+# the same: clocks before places, places before velocities, all before the wheels.
+ORDER = (topics_check, stamps_check, frames_check, imu_check, odometry_check, clocks_check, fix_check, velocity_check,
+         yaw_check, wheels_check, covariance_check, antenna_check, satellites_check)
 
 
 def examine(recording, setup, report=lambda name: None):
     """All findings. A check that stumbles over odd data says so and does not keep the others from their work."""
     evidence = Evidence(recording, setup)
+    yaw_check.choose_source(evidence, motion_fit.readings_of(evidence))
     findings = []
     for module in ORDER:
         name = module.__name__.split(".")[-1][:-len("_check")]

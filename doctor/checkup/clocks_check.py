@@ -7,19 +7,26 @@ from .evidence import LEAST_WAY_M
 from .finding import failed, passed, warned
 
 AHEAD_S = 0.3          # a message cannot arrive before it was measured; clocks that are set by NTP differ by less
+FAIL_AHEAD_S = 0.9
 LATE_S = 0.5           # later than this after its stamp is more than a receiver needs
+ANOTHER_EPOCH_S = 86400.0
 FAR_S = 3.0            # the most that a localizer allows for by itself is 2 s
 NAMED_OFFSETS = ((18.0, "GPS time instead of UTC: 18 leap seconds"), (37.0, "TAI instead of UTC: 37 leap seconds"),
                  (19.0, "TAI instead of GPS time"))
-NAMED_WITHIN_S = 0.7
+NAMED_WITHIN_S, NAMED_WITHIN_MOTION_S = 0.7, 2.5  # fixes may be late besides
 IMU_WARN_S, IMU_FAIL_S = 0.25, 0.8   # yaw rates of good recordings differ by up to 0.4 s (smoothed odometry)
 IMU_SURE = 0.6                       # correlation
+IMU_GAIN = 1.1                       # of what is left unexplained, by the lag
 MOTION_WARN_S = 0.5                  # receivers that smooth are off by up to 0.4 s
-# Mean gain of the best lag over none, in standard errors over windows. Good recordings reach 2.6, at lags below 0.5 s.
-SURE, VERY_SURE = 2.0, 4.0
+# A lag is true where it makes the fit clearly better (by so much of its logarithm) in some windows, and hardly ever worse.
+# Good recordings have lags below 0.5 s, or true ones.
+MATTERS = 0.1
+HELPS_WARN, HELPS_FAIL = 4, 6          # windows
+HURTS_SHARE = 0.25                     # of those in which it helps
 COARSE = np.arange(-25.0, 25.01, 1.0)
 FINE = np.arange(-1.5, 1.51, 0.1)
-HALVES_AGREE_S = 0.8
+HALVES_AGREE_S = 1.2
+FOLLOWS = 0.35                       # of the motion that may be left, with the lag
 WINDOWS = 40
 
 
@@ -29,10 +36,10 @@ def check(evidence):
         receiver_lag(evidence, "fix")
 
 
-def named(offset):
+def named(offset, within=NAMED_WITHIN_S):
     """What an offset usually is; empty where it has no name."""
     for value, name in NAMED_OFFSETS:
-        if abs(abs(offset) - value) < NAMED_WITHIN_S:
+        if abs(abs(offset) - value) < within:
             return " ({})".format(name)
     return ""
 
@@ -51,13 +58,15 @@ def arrivals(recording):
     for kind, (stream, delay) in delays.items():
         name, offset = "clocks." + kind, delay - base
         change = ("synchronize the clocks: chrony or ntp on both computers, and the receiver's stamps in UTC",)
+        if abs(offset) > ANOTHER_EPOCH_S:
+            continue  # stamps_check tells
         if kind == reference:
             if abs(delay) > FAR_S:
                 findings.append(warned(name, "{}: stamps and times of arrival differ by {:.1f} s{}".format(
                     stream.topic, delay, named(delay)), "fine if the bag was made anew from another; else " + change[0],
                     arrival_s=delay))
         elif offset < -AHEAD_S:
-            finding = failed if offset < -1.0 else warned
+            finding = failed if offset < -FAIL_AHEAD_S else warned
             findings.append(finding(name, "{}: stamps are {:.2f} s ahead of those of {}, by the times of arrival{}".format(
                 stream.topic, -offset, delays[reference][0].topic, named(offset)), *change, arrival_s=offset))
         elif offset > LATE_S:
@@ -85,8 +94,10 @@ def imu_lag(evidence):
         evidence.recording.odometry.topic, abs(lag.correlation), abs(lag.at_zero))
     change = "one clock for both: ros::Time::now() at the measurement in both drivers, or chrony between the computers"
     values = dict(lag_s=offset, correlation=lag.correlation)
-    gains = abs(lag.correlation) - abs(lag.at_zero) > 0.02
-    if abs(offset) > IMU_FAIL_S + tolerance and gains:
+    # What is left unexplained, without and with the lag.
+    without, within = 1.0 - lag.at_zero ** 2, max(1.0 - lag.correlation ** 2, 1e-6)
+    gains = without / within > IMU_GAIN
+    if abs(offset) > IMU_FAIL_S + tolerance and gains and lag.unique:
         return [failed("clocks.imu_motion", text + named(offset), change, "or localization.launch use_imu:=false", **values)]
     if abs(offset) > IMU_WARN_S + tolerance and gains:
         return [warned("clocks.imu_motion", text, change, **values)]
@@ -104,15 +115,15 @@ def receiver_lag(evidence, kind):
     found = motion_lag(track, t, q, kind == "velocity")
     if found is None:
         return []
-    lag, sureness, agrees = found
+    lag, helps, hurts, agrees = found
     stream = getattr(evidence.recording, kind)
     text = "by the motion, stamps of {} are {:.1f} s {} those of {}".format(
         stream.topic, abs(lag), "ahead of" if lag > 0 else "behind", evidence.recording.odometry.topic)
-    name, values = "clocks.{}_motion".format(kind), dict(lag_s=lag, sureness=sureness)
+    name, values = "clocks.{}_motion".format(kind), dict(lag_s=lag, helps=helps, hurts=hurts)
     if abs(lag) <= MOTION_WARN_S:
         return [passed(name, "{} and odometry agree in time, to {:.1f} s by the motion".format(stream.topic, abs(lag)),
                        **values)]
-    if sureness < SURE or not agrees:
+    if helps < HELPS_WARN or hurts > HURTS_SHARE * helps or not agrees:
         return [passed(name, "the motion does not tell whether {} and odometry agree in time".format(stream.topic),
                        **values)]
     if lag > 0:
@@ -121,12 +132,17 @@ def receiver_lag(evidence, kind):
     if abs(lag) <= FAR_S:
         change.append("imm_ekf: {{expert: {{fix_delay: {:.1f}}}}}  # or leave it at auto, which finds up to 2 s".format(lag))
         return [warned(name, text, *change, **values)]
-    finding = failed if sureness > VERY_SURE else warned
-    return [finding(name, text + named(lag), *change, **values)]
+    evidence.shift(kind, lag)  # so that the other checks see past it
+    finding = failed if helps >= HELPS_FAIL else warned
+    return [finding(name, text + named(lag, NAMED_WITHIN_MOTION_S), *change, **values)]
 
 
 def motion_lag(track, t, q, of_velocity):
-    """(lag s, how sure, whether halves of the drive agree) by the windows with most change of motion."""
+    """(lag s, in how many windows it helps, in how many it hurts, whether it can be believed).
+
+    Looked at are the windows with most change of motion. It is believed where two halves of them find the same, and the
+    motion is explained with it.
+    """
     if of_velocity:
         usual = np.percentile(np.abs(q), 98)
         t, q = t[np.abs(q) <= 2.0 * usual + 1.0], q[np.abs(q) <= 2.0 * usual + 1.0]
@@ -137,6 +153,10 @@ def motion_lag(track, t, q, of_velocity):
     if len(parts) < 4:
         return None
     parts = fits.most_excited(track, t, parts, WINDOWS)
+    # Wheels that are off by some per cent would hide a delay.
+    scales = [each.scale for each in fits.window_fits(track, t, q, parts, 0.0, of_velocity)]
+    if 0.8 < signals.median(scales) < 1.25:
+        q = q / signals.median(scales)
     spread = fits.spread_of(fits.window_fits(track, t, q, parts, 0.0, of_velocity))
 
     def costs(lags):
@@ -148,8 +168,14 @@ def motion_lag(track, t, q, of_velocity):
     fine = costs(lags)
     best = int(np.argmin(np.mean(fine, axis=1)))
     halves = [lags[np.argmin(np.mean(fine[:, begin::2], axis=1))] for begin in (0, 1)]
-    none = costs([0.0])[0]
-    advantage = none - fine[best]
-    error = np.std(advantage) / np.sqrt(0.5 * len(parts))  # windows overlap by half
-    sureness = float(np.mean(advantage) / max(error, 1e-9))
-    return float(lags[best]), sureness, bool(abs(halves[0] - halves[1]) <= HALVES_AGREE_S)
+    advantage = costs([0.0])[0] - fine[best]
+    found = fits.window_fits(track, t, q, parts, lags[best], of_velocity)
+    left = [np.median(np.abs(each.residuals)) / max(size(q[part], of_velocity), 1e-6) for each, part in zip(found, parts)]
+    follows = signals.median(left) < FOLLOWS
+    agrees = bool(abs(halves[0] - halves[1]) <= HALVES_AGREE_S and follows)
+    return float(lags[best]), int(np.sum(advantage > MATTERS)), int(np.sum(advantage < -MATTERS)), agrees
+
+
+def size(q, of_velocity):
+    """How much there is to explain: the extent of places, or the size of velocities."""
+    return float(np.sqrt(np.mean(np.abs(q if of_velocity else q - np.mean(q)) ** 2)))

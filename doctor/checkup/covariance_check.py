@@ -11,6 +11,7 @@ from .finding import failed, passed, warned
 OVER_WARN, OVER_FAIL, OVER_FAIL_CONSTANT = 3.0, 20.0, 5.0
 UNDER_WARN = 0.02
 MEDIAN_OF_RAYLEIGH = 1.1774    # of a length whose components have sigma 1
+UNRELATED = 0.5                # of a window's extent that is left: the track is not that of the fixes
 TINY_SIGMA_M = 0.02            # less than a receiver with corrections has
 LEAST = 20
 SECTION_CHANGE = "{}: {{use_fix_covariance: false, direct_sigma: {:.1f}}}"
@@ -50,7 +51,12 @@ def seen(evidence):
     parts = motion_fit.useful_windows(track, t, q, track.t)
     if len(parts) < 3:
         return float("nan"), float("nan")
-    all_fits = fits.window_fits(track, t, q, parts)
+    # With a free scale: the wheels' unit is not the receiver's fault.
+    all_fits = fits.window_fits(track, t, q, parts, free_scale=True)
+    left = [np.median(np.abs(each.residuals)) / max(motion_fit.extent(q[part]), 1e-6)
+            for each, part in zip(all_fits, parts)]
+    if signals.median(left) > UNRELATED:
+        return float("nan"), float("nan")
     residuals = np.concatenate([np.abs(each.residuals) for each in all_fits])
     steps = np.concatenate([np.abs(np.diff(each.residuals)) for each in all_fits])
     return signals.median(residuals) / MEDIAN_OF_RAYLEIGH, signals.median(steps) / MEDIAN_OF_RAYLEIGH / np.sqrt(2.0)

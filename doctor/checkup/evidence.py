@@ -7,6 +7,7 @@ from . import fits, geodesy, signals
 MOVING_MPS = 0.2         # slower is standing, for checks of motion
 LEAST_WAY_M = 10.0       # within a window, for it to say something of the motion
 BELIEVABLE_MPS = 1e4     # faster is no speed at all
+LONGEST_S = 2e5          # from the median stamp: more is another clock, not a drive
 
 
 def imu_yaw_rate(imu):
@@ -17,6 +18,13 @@ def imu_yaw_rate(imu):
     w, x, y, z = quaternion / np.where(norm > 0.0, norm, 1.0)
     vertical = 2.0 * (x * z - w * y) * imu.wx + 2.0 * (y * z + w * x) * imu.wy + (1.0 - 2.0 * (x * x + y * y)) * imu.wz
     return np.where(oriented, vertical, imu.wz), oriented
+
+
+def stamps(stream, good=True):
+    """The stamps, NaN where a message is not good or its stamp is none of this drive."""
+    some = stream.t > 0.0
+    centre = signals.median(stream.t[some])
+    return np.where(good & some & (np.abs(stream.t - centre) < LONGEST_S), stream.t, np.nan)
 
 
 def is_place(lat, lon):
@@ -37,15 +45,16 @@ class Evidence:
         self.fixes = self._fixes(recording.fix)                   # (t, place, declared sigma or NaN)
         self.velocities = self._velocities(recording.velocity)    # (t, velocity, east + i north)
         self.tracks = self._tracks()                              # {"odometry", "imu"}: fits.Track
-        self.rates_agree = None                                   # set by the check of the IMU
-        self.yaw_source = "odometry"                              # of the track that fits best; set by motion_fit
+        # Set by checks for those after them, so that one fault is told once:
+        self.yaw_source = "odometry"    # of the track that fits best
+        self.twist_is_wrong = False     # it is not in the robot's frame
 
     @staticmethod
     def _odometry(odometry):
         if odometry is None or len(odometry) < 2:
             return None
-        believable = ((np.hypot(odometry.vx, odometry.vy) < BELIEVABLE_MPS) & (odometry.t > 0.0))
-        t, vx, vy, wz = signals.in_order(np.where(believable, odometry.t, np.nan), odometry.vx, odometry.vy, odometry.wz)
+        believable = np.hypot(odometry.vx, odometry.vy) < BELIEVABLE_MPS
+        t, vx, vy, wz = signals.in_order(stamps(odometry, believable), odometry.vx, odometry.vy, odometry.wz)
         return (t, vx + 1j * vy, wz) if len(t) > 1 else None
 
     @staticmethod
@@ -53,17 +62,17 @@ class Evidence:
         if imu is None or len(imu) < 2:
             return None
         rate, _ = imu_yaw_rate(imu)
-        t, rate = signals.in_order(np.where(imu.t > 0.0, imu.t, np.nan), rate)
+        t, rate = signals.in_order(stamps(imu), rate)
         return (t, rate) if len(t) > 1 else None
 
     @staticmethod
     def _fixes(fix):
         if fix is None:
             return None
-        good = is_place(fix.lat, fix.lon) & (fix.status >= 0) & (fix.t > 0.0)
+        good = is_place(fix.lat, fix.lon) & (fix.status >= 0)
         with np.errstate(invalid="ignore"):
             sigma = np.sqrt(np.where((fix.cov_xx > 0.0) & (fix.cov_yy > 0.0), 0.5 * (fix.cov_xx + fix.cov_yy), 0.0))
-        t, lat, lon, sigma = signals.in_order(np.where(good, fix.t, np.nan), fix.lat, fix.lon, sigma)
+        t, lat, lon, sigma = signals.in_order(stamps(fix, good), fix.lat, fix.lon, sigma)
         if len(t) < 2:
             return None
         return t, geodesy.to_plane(lat, lon), np.where(sigma > 0.0, sigma, np.nan)
@@ -73,8 +82,7 @@ class Evidence:
         if velocity is None:
             return None
         believable = np.hypot(velocity.vx, velocity.vy) < BELIEVABLE_MPS
-        t, east, north = signals.in_order(np.where(believable & (velocity.t > 0.0), velocity.t, np.nan), velocity.vx,
-                                          velocity.vy)
+        t, east, north = signals.in_order(stamps(velocity, believable), velocity.vx, velocity.vy)
         return (t, east + 1j * north) if len(t) > 1 else None
 
     def _tracks(self):
@@ -87,6 +95,17 @@ class Evidence:
         if mean_rate is not None:
             tracks["imu"] = fits.Track(t, velocity, mean_rate)
         return tracks
+
+    def shift(self, kind, lag):
+        """Takes a clock's offset out of fixes or velocities (s, positive: stamps ahead)."""
+        if kind == "fix":
+            self.fixes = (self.fixes[0] - lag,) + self.fixes[1:]
+        else:
+            self.velocities = (self.velocities[0] - lag,) + self.velocities[1:]
+
+    def replace_places(self, places):
+        """Other places for the fixes, where the recorded ones are wrong in a way that is known."""
+        self.fixes = (self.fixes[0], places, self.fixes[2])
 
     def imu_rate_at(self, t):
         """The IMU's mean yaw rate over the time before each of `t`; None where it does not cover most of them."""

@@ -84,7 +84,7 @@ def windows(t, covered_t, length=WINDOW_S):
     begin = t[0]
     while begin < t[-1]:
         low, high = np.searchsorted(t, [begin, begin + length])
-        begin += 0.5 * length
+        begin = max(begin + 0.5 * length, t[low]) if high == low else begin + 0.5 * length
         if high - low < LEAST_POINTS or t[high - 1] - t[low] < 0.5 * length:
             continue
         if t[low] < covered_t[0] or t[high - 1] > covered_t[-1]:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from . import geodesy, motion_fit, signals
-from .evidence import is_place
+from .evidence import is_place, stamps
 from .finding import failed, passed, warned
 
 FEW = 0.01
@@ -87,10 +87,11 @@ def swapped(evidence):
     track, fix = evidence.track(), evidence.recording.fix
     if track is None or evidence.fixes is None:
         return []
-    good = is_place(fix.lat, fix.lon) & is_place(fix.lon, fix.lat) & (fix.status >= 0) & (fix.t > 0.0)
+    good = is_place(fix.lat, fix.lon) & is_place(fix.lon, fix.lat) & (fix.status >= 0)
     if np.mean(good) < 0.9:
         return []
-    t, lat, lon = signals.in_order(np.where(good, fix.t, np.nan), fix.lat, fix.lon)
+    lag = signals.median(stamps(fix)) - signals.median(evidence.fixes[0])  # that the check of clocks took out
+    t, lat, lon = signals.in_order(stamps(fix, good) - (lag if abs(lag) < 60.0 else 0.0), fix.lat, fix.lon)
     q, other_q = geodesy.to_plane(lat, lon), geodesy.to_plane(lon, lat)
     # By the odometry or by the IMU: whichever fits the fixes as they are better.
     for each in [evidence.tracks[name] for name in sorted(evidence.tracks)]:
@@ -106,6 +107,8 @@ def swapped(evidence):
             return [warned("fix.swapped", "{}: the way is a mirror image of the odometry's: latitude and longitude are "
                            "swapped, or the yaw rate has the reversed sign".format(fix.topic),
                            "in the driver: latitude and longitude in this order")]
+    if len(t) == len(evidence.fixes[0]):
+        evidence.replace_places(other_q)  # so that the other checks see past it
     return [failed("fix.swapped", "{}: the way fits the odometry only with latitude and longitude swapped ({:.5f}, {:.5f} "
                    "would be the place)".format(fix.topic, signals.median(fix.lon), signals.median(fix.lat)),
                    "in the driver: latitude and longitude in this order")]

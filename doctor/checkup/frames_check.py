@@ -1,8 +1,9 @@
 """frame_ids, and the transforms that a localizer will miss."""
 
-from .finding import passed, warned, failed
+import numpy as np
 
-ODOM_CHANGE = "localization.launch {}:={}, or the driver's parameter for its frames"
+from .evidence import imu_yaw_rate
+from .finding import failed, passed, warned
 
 
 def check(evidence):
@@ -98,6 +99,9 @@ def sensor_tf(recording, setup):
                 base, frame, stream.topic)))
         elif stream.kind == "fix" and setup.given_antenna:
             findings.append(passed("frames.tf_fix", "no tf from {} to {}; antenna_offset is given".format(base, frame)))
+        elif stream.kind == "imu" and np.mean(imu_yaw_rate(stream)[1]) > 0.9:
+            findings.append(passed("frames.tf_imu", "no tf from {} to {}; the messages have an orientation".format(
+                base, frame)))
         else:
             what = ("the antenna is taken to be at {}".format(base) if stream.kind == "fix" else
                     "it is taken to have its z axis up")

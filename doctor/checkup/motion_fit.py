@@ -11,6 +11,7 @@ import numpy as np
 from . import fits
 
 DEGREE = np.pi / 180.0
+IN_ODOM_FRAME = "twist in the odometry's frame"
 # Another reading is right only where it explains more by this (mean of the logarithm of what is left), surely (mean over
 # its standard error), in most windows. On good recordings a wrong reading has gains of -0.1 to -4; see docs/doctor.md.
 LEAST_GAIN = 0.3
@@ -70,7 +71,7 @@ def readings_of(evidence, lag=0.0):
     others = [("in degrees", rate * DEGREE), ("reversed", -rate), ("reversed and in degrees", -rate * DEGREE)]
     found += [read(name, "odometry", fits.Track(odometry_t, velocity, other), t, q, parts, lag) for name, other in others]
     fixed = fits.Track(odometry_t, velocity, np.zeros_like(rate))
-    found.append(read("twist in the odometry's frame", "odometry", fixed, t, q, parts, lag))
+    found.append(read(IN_ODOM_FRAME, "odometry", fixed, t, q, parts, lag))
     imu = evidence.imu_rate_at(odometry_t)
     if imu is not None:
         for name, other in (("as it is", imu), ("in degrees", imu * DEGREE), ("reversed", -imu),

@@ -3,9 +3,9 @@
 import numpy as np
 
 from . import signals
-from .evidence import LEAST_WAY_M
+from .evidence import LEAST_WAY_M, stamps
 from .finding import failed, passed, warned
-from .units import RATE_UNITS, SPEED_UNITS, name_of
+from .units import SPEED_UNITS, name_of, rate_name_of
 
 STEP_S = 0.5           # over which pose and twist are compared: long enough for odometry of 100 Hz with rounded poses
 MOVING_MPS = 0.1
@@ -15,7 +15,7 @@ SAME_WITHIN = 0.15     # factor between pose and twist that no unit explains; fi
 CONCENTRATED = 0.9     # length of the mean direction
 REVERSE_SHARE = 0.9    # of the way: who drives backwards so much has a wrong sign
 SIDEWAYS_MPS, SIDEWAYS_SHARE = 0.1, 0.05
-LEAST_TURN_RAD = 0.5
+SPINS_RAD = 1.0        # in a step: no way to compare ways any more
 
 
 def check(evidence):
@@ -25,7 +25,8 @@ def check(evidence):
         return []
     findings = not_finite(odometry)
     steps = pose_steps(odometry)
-    findings += pose_and_twist(evidence, odometry, steps)
+    findings += pose_and_twist(odometry, steps)
+    evidence.twist_is_wrong = any("frame" in each.text for each in findings if each.level == "FAIL")
     findings += direction(evidence, odometry)
     findings += sideways(evidence, odometry)
     findings += declared(odometry)
@@ -55,8 +56,8 @@ def pose_steps(odometry):
     """Steps; None where there are too few poses."""
     yaw_known = bool(np.mean(odometry.quaternion_norm > 0.5) > 0.9)
     yaw = odometry.yaw if yaw_known else np.zeros(len(odometry))
-    t, x, y, yaw, vx, vy, wz = signals.in_order(np.where(odometry.t > 0.0, odometry.t, np.nan), odometry.x, odometry.y,
-                                                yaw, odometry.vx, odometry.vy, odometry.wz)
+    t, x, y, yaw, vx, vy, wz = signals.in_order(stamps(odometry), odometry.x, odometry.y, yaw, odometry.vx, odometry.vy,
+                                                odometry.wz)
     if len(t) < LEAST_SAMPLES:
         return None
     size = max(1, int(round(STEP_S / signals.period(t))))
@@ -78,7 +79,7 @@ def pose_steps(odometry):
     return Steps(means(velocity), means(velocity * np.exp(1j * middle)), means(wz), pose_velocity, pose_rate, yaw_known)
 
 
-def pose_and_twist(evidence, odometry, steps):
+def pose_and_twist(odometry, steps):
     """Whether pose and twist tell the same motion."""
     if steps is None:
         return []
@@ -96,7 +97,7 @@ def pose_and_twist(evidence, odometry, steps):
         return [warned(name, "{}: the pose stays where it is, though the twist moves: twist only; tf is then of no "
                        "use".format(topic), "in the driver: integrate the pose, and broadcast odom -> base_link")]
     findings = []
-    both = moves & pose_moves
+    both = moves & pose_moves & (np.abs(steps.pose_rate) * STEP_S < SPINS_RAD) & (np.abs(steps.rate) * STEP_S < SPINS_RAD)
     if np.sum(both) >= LEAST_SAMPLES:
         findings += speeds(name, topic, steps, both)
     turning = turns & pose_turns if np.sum(turns & pose_turns) >= LEAST_SAMPLES else None
@@ -146,7 +147,7 @@ def rates(name, topic, steps, turning):
     """Yaw rate of the twist against the pose's."""
     ratio = signals.median(steps.rate[turning] / steps.pose_rate[turning])
     agree = np.mean(np.sign(steps.rate[turning]) == np.sign(steps.pose_rate[turning]))
-    unit = name_of(abs(ratio), RATE_UNITS)
+    unit = rate_name_of(abs(ratio))
     values = dict(rate_ratio=ratio)
     if ratio < 0.0 and agree < 0.2:
         return [failed(name, "{}: the twist's yaw rate has the reversed sign of the pose's{}".format(

@@ -4,11 +4,15 @@ from collections import namedtuple
 
 import numpy as np
 
+LONGEST_SERIES = 2000000
+AS_GOOD, NEARLY_AS_GOOD = 0.97, 0.9  # of the greatest correlation
+NEAR_S = 5.0           # the flank of a peak
 SCALE_OF_MAD = 1.4826  # median absolute deviation to the standard deviation of a normal distribution
 
 # `lag` s: by how much the stamps of the second series are ahead of the first's (positive: its events have later stamps);
 # `correlation` at this lag, of the sign of the strongest; `at_zero` the correlation without a lag; `support` samples.
-Lag = namedtuple("Lag", "lag correlation at_zero support")
+# `unique`: whether no other lag is nearly as good.
+Lag = namedtuple("Lag", "lag correlation at_zero support unique")
 
 
 def finite(values):
@@ -63,10 +67,11 @@ def resample(t, values, grid, step):
     return (high - low) / step, valid
 
 
-def common_grid(first_t, second_t, finest=0.05, coarsest=1.0):
-    """A regular grid over both, and its step: as coarse as the slower one."""
+def common_grid(first_t, second_t, finest=0.05, coarsest=1.0, reach=0.0):
+    """A regular grid where both are, and `reach` around, and its step: as coarse as the slower one."""
     step = float(np.clip(max(period(first_t), period(second_t)), finest, coarsest))
-    return np.arange(min(first_t[0], second_t[0]), max(first_t[-1], second_t[-1]) + step, step), step
+    begin, end = max(first_t[0], second_t[0]) - reach, min(first_t[-1], second_t[-1]) + reach
+    return np.arange(begin, end, step) if end > begin else np.empty(0), step
 
 
 def correlate(first, first_valid, second, second_valid, reach):
@@ -104,8 +109,8 @@ def find_lag(first_t, first, second_t, second, reach_s, least_support=40):
     second_t, second = in_order(second_t, second)
     if len(first_t) < 5 or len(second_t) < 5:
         return None
-    grid, step = common_grid(first_t, second_t)
-    if len(grid) > 2000000 or len(grid) < 5:
+    grid, step = common_grid(first_t, second_t, reach=reach_s)
+    if not 5 <= len(grid) <= LONGEST_SERIES:
         return None
     a, a_valid = resample(first_t, first, grid, step)
     b, b_valid = resample(second_t, second, grid, step)
@@ -114,9 +119,14 @@ def find_lag(first_t, first, second_t, second, reach_s, least_support=40):
     enough = count >= max(least_support, 0.3 * np.max(count))
     if not enough.any() or np.max(np.abs(values[enough])) == 0.0:
         return None
-    best = int(np.argmax(np.where(enough, np.abs(values), 0.0)))
+    size = np.where(enough, np.abs(values), 0.0)
+    # Of lags that are as good, the shortest: turns to and fro repeat themselves.
+    peaks = np.flatnonzero((size >= np.maximum(np.roll(size, 1), np.roll(size, -1))) & (size > AS_GOOD * np.max(size)))
+    best = int(peaks[np.argmin(np.abs(peaks - reach))]) if len(peaks) else int(np.argmax(size))
+    others = np.abs(np.arange(len(size)) - best) * step > NEAR_S
+    unique = not others.any() or np.max(size[others]) < NEARLY_AS_GOOD * size[best]
     return Lag((best - reach + _vertex(np.abs(values), best)) * step, float(values[best]), float(values[reach]),
-               int(count[best]))
+               int(count[best]), bool(unique))
 
 
 def _vertex(values, best):

@@ -16,6 +16,17 @@ RATE_UNITS = ((180.0 / math.pi, "degrees per second in place of rad/s"),
               (2.0, "double: gear or track width is wrong"))
 
 
+DEGREES_WITHIN = 0.8  # nothing else is near: wheels that slip and noise change the factor, not the unit
+
+
+def rate_name_of(factor):
+    """The name of a factor between yaw rates; None where it has none."""
+    for value, name in RATE_UNITS[:2]:
+        if factor > 0.0 and abs(math.log(factor / value)) < DEGREES_WITHIN:
+            return name
+    return name_of(factor, RATE_UNITS[2:])
+
+
 def name_of(factor, units, within=WITHIN):
     """The unit whose factor is nearest; None where none is near."""
     if not factor > 0.0 or not math.isfinite(factor):

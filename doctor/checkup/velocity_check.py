@@ -21,7 +21,10 @@ def check(evidence):
     velocity = evidence.recording.velocity
     if velocity is None or len(velocity) < fits.LEAST_POINTS or evidence.velocities is None:
         return []
-    return not_finite(velocity) + still(evidence) + directions(evidence) + declared(velocity)
+    findings = not_finite(velocity) + still(evidence) + directions(evidence) + declared(velocity)
+    if any(finding.level == "FAIL" and finding.check in ("velocity.frame", "velocity.zero") for finding in findings):
+        evidence.velocities = None  # the other checks do without
+    return findings
 
 
 def not_finite(velocity):
@@ -78,7 +81,7 @@ def directions(evidence):
         return [mirrored_finding(evidence, name, topic, values)]
     if values["left"] > GOOD_LEFT:
         return [passed(name, "{}: the fixes are too rough to compare it with".format(topic), **values)]
-    return turned(name, topic, plain, values) + units(topic, plain)
+    return turned(name, topic, plain, values) + units(evidence, topic, plain)
 
 
 def side_share(velocity):
@@ -134,7 +137,7 @@ def turned(name, topic, plain, values):
                    **values)]
 
 
-def units(topic, plain):
+def units(evidence, topic, plain):
     """Its size by the fixes."""
     good = plain.left < 0.3
     if np.sum(good) < LEAST_WINDOWS:
@@ -144,6 +147,7 @@ def units(topic, plain):
     unit = name_of(factor, SPEED_UNITS[:10])
     values = dict(velocity_over_fixes=factor)
     if abs(np.log(factor)) > max(np.log(1.0 + SCALE_WITHIN), 3.0 * error):
+        evidence.velocities = (evidence.velocities[0], evidence.velocities[1] / factor)  # for the other checks
         return [(failed if unit else warned)("velocity.speed", "{}: {:.3g} times as fast as the fixes move{}".format(
             topic, factor, ": " + unit if unit else ""), "in the driver: m/s", **values)]
     return [passed("velocity.speed", "{}: {:.3f} times as fast as the fixes move".format(topic, factor), **values)]

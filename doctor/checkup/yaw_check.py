@@ -4,7 +4,8 @@ import numpy as np
 
 from . import motion_fit, signals
 from .finding import failed, passed, warned
-from .units import RATE_UNITS, name_of
+from .motion_fit import IN_ODOM_FRAME
+from .units import RATE_UNITS, rate_name_of
 
 TURNING_RAD_S = 0.05
 LEAST_TURNING = 20        # samples; less turning says nothing
@@ -14,19 +15,36 @@ SAME_WITHIN = 0.3         # of the factor between them: wheels that slip in turn
 BIAS_RAD_S = 0.01         # 0.6 deg/s: learnt by the filter, but slowly
 GREAT_RATE_RAD_S = 8.0    # faster than any robot turns for long: degrees
 SMALL_RAD_S = 1e-9
+SIDEWAYS_MPS, SIDEWAYS_SHARE = 0.1, 0.05
 
 
 def check(evidence):
-    """All findings of this family; sets evidence.yaw_source."""
+    """All findings of this family."""
     readings = motion_fit.readings_of(evidence)
-    by_receiver = {source: best_reading(readings, source) for source in ("odometry", "imu")}
     choose_source(evidence, readings)
+    if evidence.twist_is_wrong:
+        return once(pair(evidence, {}) + impossible(evidence, "odometry") + impossible(evidence, "imu"))
+    if moves_in_odom_frame(evidence, readings):
+        # Then the ways say nothing of the yaw rates.
+        return [failed("odometry.frame", "{}: fixes move as if the twist were in the odometry's frame (header.frame_id), not "
+                       "in the robot's".format(evidence.recording.odometry.topic),
+                       "in the driver: twist in child_frame_id, x forward")] + pair(evidence, {})
+    by_receiver = {source: best_reading(readings, source) for source in ("odometry", "imu")}
     findings = pair(evidence, by_receiver)
     for source in ("odometry", "imu"):
         findings += against_receiver(evidence, source, by_receiver[source])
         findings += impossible(evidence, source)
     findings += bias(evidence)
     return once(findings)
+
+
+def moves_in_odom_frame(evidence, readings):
+    """Whether the twist has a part to the side, and fits the receiver best if it is not turned by the heading."""
+    if not readings or not np.mean(np.abs(evidence.motion[1].imag) > SIDEWAYS_MPS) > SIDEWAYS_SHARE:
+        return False
+    unturned = next(reading for reading in readings if reading.name == IN_ODOM_FRAME)
+    best = motion_fit.best_of(readings)
+    return motion_fit.clearly_better(unturned, readings[0]) and not motion_fit.clearly_better(best, unturned)
 
 
 def once(findings):
@@ -74,6 +92,8 @@ def rates_of(evidence):
         return None
     shift = lag.lag if abs(lag.correlation) > CORRELATED else 0.0
     grid, step = signals.common_grid(t, imu_t, 0.1)
+    if len(grid) < LEAST_TURNING:
+        return None
     odometry, first = signals.resample(t - half, rate, grid, step)
     imu, second = signals.resample(imu_t - shift, imu_rate, grid, step)
     both = first & second
@@ -86,16 +106,13 @@ def pair(evidence, by_receiver):
     if found is None:
         return []
     odometry, imu, lag = found
-    quiet = SMALL_RAD_S
-    if len(imu) and np.max(np.abs(imu)) < quiet and np.max(np.abs(odometry)) > TURNING_RAD_S:
+    if len(imu) and np.max(np.abs(imu)) < SMALL_RAD_S and np.max(np.abs(odometry)) > TURNING_RAD_S:
         return [failed("imu.yaw_rate", "{}: the yaw rate is always zero, though the odometry turns".format(
             evidence.recording.imu.topic), "localization.launch use_imu:=false, or correct the driver")]
     turning = int(np.sum(np.abs(odometry) > TURNING_RAD_S)), int(np.sum(np.abs(imu) > TURNING_RAD_S))
     if max(turning) < LEAST_TURNING or len(imu) < LEAST_TURNING:
         return [passed("imu.yaw_rate", "too few turns to compare the yaw rates of odometry and IMU")]
-    spread = signals.robust_sigma(imu), signals.robust_sigma(odometry)
-    size = float(np.std(imu) / max(np.std(odometry), SMALL_RAD_S)) if min(spread) > 0.0 else \
-        float(np.std(imu) / max(np.std(odometry), SMALL_RAD_S))
+    size = float(np.std(imu) / max(np.std(odometry), SMALL_RAD_S))
     if abs(lag.correlation) < CORRELATED:
         return unrelated(evidence, odometry, imu, lag, size)
     slope = float(np.sum(odometry * imu) / max(np.sum(odometry ** 2 if size >= 1.0 else imu ** 2), 1e-12))
@@ -107,7 +124,7 @@ def pair(evidence, by_receiver):
 def judge(evidence, slope, values, by_receiver):
     """What a factor between IMU and odometry means, and whose fault it is."""
     imu, odometry = evidence.recording.imu.topic, evidence.recording.odometry.topic
-    unit = name_of(abs(slope), RATE_UNITS)
+    unit = rate_name_of(abs(slope))
     reversed_sign = slope < 0.0
     if not reversed_sign and abs(np.log(slope)) < np.log(1.0 + SAME_WITHIN):
         return [passed("imu.yaw_rate", "{}: the yaw rate is {:.3f} times the odometry's".format(imu, slope), **values)]
@@ -208,12 +225,9 @@ def against_receiver(evidence, source, found):
     name, values = source + ".yaw_rate", dict(reading=reading, gain=size, sureness=sureness)
     if reading == "as it is":
         return [passed(name, "{}: turns as the fixes do".format(topic), **values)]
-    if reading == "twist in the odometry's frame":
-        if np.mean(np.abs(evidence.motion[1].imag) > 0.1) < 0.05:
-            return [warned(name, "{}: the fixes go straighter than this yaw rate".format(topic),
-                           "compare with an IMU; wheels that slip?", **values)]
-        return [failed(name, "{}: fixes move as if the twist were in the odometry's frame (header.frame_id)".format(topic),
-                       "in the driver: twist in child_frame_id, x forward", **values)]
+    if reading == IN_ODOM_FRAME:
+        return [warned(name, "{}: the fixes go straighter than this yaw rate".format(topic),
+                       "compare with an IMU; wheels that slip?", **values)]
     text = {"in degrees": "in degrees per second", "reversed": "of the reversed sign",
             "reversed and in degrees": "of the reversed sign and in degrees per second"}[reading]
     if reading != "reversed" and signals.robust_sigma(evidence.motion[2]) < TURNING_RAD_S and source == "odometry" and \
