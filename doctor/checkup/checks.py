@@ -9,8 +9,9 @@ from .finding import FAIL, LEVELS, WARN, warned
 
 # What a check finds wrong is put right in the evidence where that can be done, so that those after it do not complain of
 # the same: clocks before places, places before velocities, all before the wheels.
-ORDER = (topics_check, stamps_check, frames_check, imu_check, odometry_check, clocks_check, fix_check, velocity_check,
-         yaw_check, wheels_check, covariance_check, antenna_check, satellites_check)
+ORDER = (topics_check.check, stamps_check.check, frames_check.check, imu_check.check, odometry_check.check,
+         clocks_check.check, fix_check.check, velocity_check.check, clocks_check.check_velocity, yaw_check.check,
+         wheels_check.check, covariance_check.check, antenna_check.check, satellites_check.check)
 
 
 def examine(recording, setup, report=lambda name: None):
@@ -18,11 +19,11 @@ def examine(recording, setup, report=lambda name: None):
     evidence = Evidence(recording, setup)
     yaw_check.choose_source(evidence, motion_fit.readings_of(evidence))
     findings = []
-    for module in ORDER:
-        name = module.__name__.split(".")[-1][:-len("_check")]
+    for check in ORDER:
+        name = check.__module__.split(".")[-1][:-len("_check")]
         report(name)
         try:
-            findings += module.check(evidence)
+            findings += check(evidence)
         except (ArithmeticError, IndexError, ValueError) as error:
             place = traceback.extract_tb(error.__traceback__)[-1]
             findings.append(warned(name + ".check", "these data cannot be checked ({}:{}: {})".format(

@@ -4,7 +4,7 @@ import numpy as np
 
 from . import fits, signals
 from .evidence import LEAST_WAY_M
-from .finding import failed, passed, warned
+from .finding import PASS, failed, passed, warned
 
 AHEAD_S = 0.3          # a message cannot arrive before it was measured; clocks that are set by NTP differ by less
 FAIL_AHEAD_S = 0.9
@@ -17,7 +17,7 @@ NAMED_WITHIN_S, NAMED_WITHIN_MOTION_S = 0.7, 2.5  # fixes may be late besides
 IMU_WARN_S, IMU_FAIL_S = 0.25, 0.8   # yaw rates of good recordings differ by up to 0.4 s (smoothed odometry)
 IMU_SURE = 0.6                       # correlation
 IMU_GAIN = 1.1                       # of what is left unexplained, by the lag
-MOTION_WARN_S = 0.5                  # receivers that smooth are off by up to 0.4 s
+MOTION_WARN_S = 0.7                  # receivers that smooth are off by up to 0.6 s
 # A lag is true where it makes the fit clearly better (by so much of its logarithm) in some windows, and hardly ever worse.
 # Good recordings have lags below 0.5 s, or true ones.
 MATTERS = 0.1
@@ -26,14 +26,23 @@ HURTS_SHARE = 0.25                     # of those in which it helps
 COARSE = np.arange(-25.0, 25.01, 1.0)
 FINE = np.arange(-1.5, 1.51, 0.1)
 HALVES_AGREE_S = 1.2
-FOLLOWS = 0.35                       # of the motion that may be left, with the lag
+FOLLOWS = 0.5                       # of the motion that may be left, with the lag
 WINDOWS = 40
 
 
 def check(evidence):
-    """All findings of this family."""
-    return arrivals(evidence.recording) + imu_lag(evidence) + receiver_lag(evidence, "velocity") + \
-        receiver_lag(evidence, "fix")
+    """All findings of this family but those that need a velocity that points where it should."""
+    return arrivals(evidence) + imu_lag(evidence) + receiver_lag(evidence, "fix", evidence.track())
+
+
+def check_velocity(evidence):
+    """The clock of the receiver's velocity; and that of the fixes by the velocity, which is better than wheels."""
+    if not evidence.velocity_is_good:
+        return []
+    findings = receiver_lag(evidence, "velocity", evidence.track())
+    t, velocity = evidence.velocities
+    by_velocity = receiver_lag(evidence, "fix", fits.Track(t, velocity, np.zeros(len(t))), evidence.recording.velocity)
+    return findings + [finding for finding in by_velocity if finding.level != PASS]
 
 
 def named(offset, within=NAMED_WITHIN_S):
@@ -44,8 +53,9 @@ def named(offset, within=NAMED_WITHIN_S):
     return ""
 
 
-def arrivals(recording):
+def arrivals(evidence):
     """Stamps against the time of arrival, beside those of the odometry (or of the stream with most messages)."""
+    recording = evidence.recording
     delays = {stream.kind: (stream, signals.median((stream.received - stream.t)[stream.t > 0.0]))
               for stream in recording.streams() if np.any(stream.t > 0.0) and stream.kind != "satellites"}
     if not delays:
@@ -67,6 +77,8 @@ def arrivals(recording):
                     arrival_s=delay))
         elif offset < -AHEAD_S:
             finding = failed if offset < -FAIL_AHEAD_S else warned
+            if finding is failed and getattr(evidence, {"fix": "fixes", "velocity": "velocities"}.get(kind, ""), None):
+                evidence.shift(kind, -offset)  # so that the other checks see past it
             findings.append(finding(name, "{}: stamps are {:.2f} s ahead of those of {}, by the times of arrival{}".format(
                 stream.topic, -offset, delays[reference][0].topic, named(offset)), *change, arrival_s=offset))
         elif offset > LATE_S:
@@ -105,10 +117,9 @@ def imu_lag(evidence):
                    **values)]
 
 
-def receiver_lag(evidence, kind):
-    """The receiver's motion against the track of the odometry."""
+def receiver_lag(evidence, kind, track, source=None):
+    """The receiver's motion against a track: that of the odometry, or of another stream."""
     data = evidence.velocities if kind == "velocity" else evidence.fixes
-    track = evidence.track()
     if data is None or track is None or track.way[-1] < 3.0 * LEAST_WAY_M:
         return []
     t, q = data[:2]
@@ -116,15 +127,18 @@ def receiver_lag(evidence, kind):
     if found is None:
         return []
     lag, helps, hurts, agrees = found
+    reference = (source or evidence.recording.odometry).topic
     stream = getattr(evidence.recording, kind)
     text = "by the motion, stamps of {} are {:.1f} s {} those of {}".format(
-        stream.topic, abs(lag), "ahead of" if lag > 0 else "behind", evidence.recording.odometry.topic)
+        stream.topic, abs(lag), "ahead of" if lag > 0 else "behind", reference)
     name, values = "clocks.{}_motion".format(kind), dict(lag_s=lag, helps=helps, hurts=hurts)
     if abs(lag) <= MOTION_WARN_S:
-        return [passed(name, "{} and odometry agree in time, to {:.1f} s by the motion".format(stream.topic, abs(lag)),
+        return [passed(name, "{} and {} agree in time, to {:.1f} s by the motion".format(
+            stream.topic, reference, abs(lag)),
                        **values)]
     if helps < HELPS_WARN or hurts > HURTS_SHARE * helps or not agrees:
-        return [passed(name, "the motion does not tell whether {} and odometry agree in time".format(stream.topic),
+        return [passed(name, "the motion does not tell whether {} and {} agree in time".format(
+            stream.topic, reference),
                        **values)]
     if lag > 0:
         text += ": fixes come late and have the time of their arrival"  if kind == "fix" else ": it comes late"

@@ -6,7 +6,7 @@ from . import fits, geodesy, signals
 
 MOVING_MPS = 0.2         # slower is standing, for checks of motion
 LEAST_WAY_M = 10.0       # within a window, for it to say something of the motion
-BELIEVABLE_MPS = 1e4     # faster is no speed at all
+BELIEVABLE_MPS = 1e5     # also in mm/s; faster is no speed at all
 LONGEST_S = 2e5          # from the median stamp: more is another clock, not a drive
 
 
@@ -48,6 +48,7 @@ class Evidence:
         # Set by checks for those after them, so that one fault is told once:
         self.yaw_source = "odometry"    # of the track that fits best
         self.twist_is_wrong = False     # it is not in the robot's frame
+        self.velocity_is_good = False   # the receiver's, by its own fixes
 
     @staticmethod
     def _odometry(odometry):

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from . import geodesy, motion_fit, signals
+from . import fits, geodesy, motion_fit, signals
 from .evidence import is_place, stamps
 from .finding import failed, passed, warned
 
@@ -10,6 +10,7 @@ FEW = 0.01
 NO_FIX_WARN = 0.2          # share of messages with status -1
 FROZEN_S = 5.0
 LEAST_WAY_M = 10.0
+STRETCHED_GAIN = 0.1
 UNITS = ((1e7, "degrees times 10^7"), (1e6, "microdegrees"), (1e3, "millidegrees"), (100.0, "degrees and minutes (DDMM.MMMM)"))
 
 
@@ -84,8 +85,8 @@ def altitude(fix):
 
 def swapped(evidence):
     """Latitude and longitude in each other's field, where both are possible: the motion tells."""
-    track, fix = evidence.track(), evidence.recording.fix
-    if track is None or evidence.fixes is None:
+    fix = evidence.recording.fix
+    if evidence.fixes is None:
         return []
     good = is_place(fix.lat, fix.lon) & is_place(fix.lon, fix.lat) & (fix.status >= 0)
     if np.mean(good) < 0.9:
@@ -93,25 +94,60 @@ def swapped(evidence):
     lag = signals.median(stamps(fix)) - signals.median(evidence.fixes[0])  # that the check of clocks took out
     t, lat, lon = signals.in_order(stamps(fix, good) - (lag if abs(lag) < 60.0 else 0.0), fix.lat, fix.lon)
     q, other_q = geodesy.to_plane(lat, lon), geodesy.to_plane(lon, lat)
-    # By the odometry or by the IMU: whichever fits the fixes as they are better.
-    for each in [evidence.tracks[name] for name in sorted(evidence.tracks)]:
-        parts = motion_fit.useful_windows(each, t, q, each.t)
-        parts = motion_fit.most_turning(each, t, parts)
-        plain = motion_fit.read("", "", each, t, q, parts)
-        mirror = motion_fit.read("", "", each, t, np.conj(q), parts)
-        other = motion_fit.read("", "", each, t, other_q, parts)
-        if not motion_fit.clearly_better(other, plain):
-            return []
-        # A reversed yaw rate looks like a mirror, too; swapped degrees are stretched besides.
-        if motion_fit.gain(other, mirror)[0] < 0.1 and len(evidence.tracks) < 2 and evidence.velocities is None:
-            return [warned("fix.swapped", "{}: the way is a mirror image of the odometry's: latitude and longitude are "
-                           "swapped, or the yaw rate has the reversed sign".format(fix.topic),
-                           "in the driver: latitude and longitude in this order")]
+    verdict = swapped_by_velocity(evidence, t, q, other_q)
+    if verdict is None:
+        verdict = swapped_by_tracks(evidence, t, q, other_q)
+    if not verdict:
+        return []
+    if verdict == "perhaps":
+        return [warned("fix.swapped", "{}: the way is a mirror image of the odometry's: latitude and longitude are swapped, "
+                       "or the yaw rate has the reversed sign".format(fix.topic),
+                       "in the driver: latitude and longitude in this order")]
     if len(t) == len(evidence.fixes[0]):
         evidence.replace_places(other_q)  # so that the other checks see past it
-    return [failed("fix.swapped", "{}: the way fits the odometry only with latitude and longitude swapped ({:.5f}, {:.5f} "
+    return [failed("fix.swapped", "{}: the way fits the motion only with latitude and longitude swapped ({:.5f}, {:.5f} "
                    "would be the place)".format(fix.topic, signals.median(fix.lon), signals.median(fix.lat)),
                    "in the driver: latitude and longitude in this order")]
+
+
+def swapped_by_velocity(evidence, t, q, other_q):
+    """Whether the receiver's velocity fits the way only with the fields swapped; None where it does not tell."""
+    if evidence.velocities is None:
+        return None
+    velocity_t, values = evidence.velocities
+    track = fits.Track(velocity_t, values, np.zeros(len(values)))
+    parts = [part for part in motion_fit.useful_windows(track, t, q, velocity_t)
+             if motion_fit.extent(q[part]) > 0.25 * LEAST_WAY_M]
+    if len(parts) < motion_fit.LEAST_WINDOWS:
+        return None
+    place = track.place_at(t)
+    plain = motion_fit.read_unturned("", place, t, q, parts)
+    other = motion_fit.read_unturned("", place, t, other_q, parts)
+    # A velocity with x north looks like a mirror, too, and one that is turned like half of one; swapped degrees are
+    # stretched besides.
+    wrong_velocities = [motion_fit.read_unturned("", each, t, q, parts)
+                        for each in (1j * np.conj(place), 1j * place, -1j * place, -place)]
+    if not motion_fit.clearly_better(other, plain):
+        return False if motion_fit.clearly_better(plain, other) else None
+    return all(motion_fit.gain(other, each)[0] > STRETCHED_GAIN for each in wrong_velocities)
+
+
+def swapped_by_tracks(evidence, t, q, other_q):
+    """The same by odometry and IMU; "perhaps" where a reversed yaw rate would look the same."""
+    stretched = False
+    for track in evidence.tracks.values():
+        parts = motion_fit.most_turning(track, t, motion_fit.useful_windows(track, t, q, track.t))
+        if len(parts) < motion_fit.LEAST_WINDOWS:
+            return False
+        plain = motion_fit.read("", "", track, t, q, parts)
+        mirror = motion_fit.read("", "", track, t, np.conj(q), parts)
+        other = motion_fit.read("", "", track, t, other_q, parts)
+        if not motion_fit.clearly_better(other, plain):
+            return False
+        stretched |= motion_fit.gain(other, mirror)[0] > STRETCHED_GAIN
+    if not evidence.tracks:
+        return False
+    return True if stretched or len(evidence.tracks) > 1 else "perhaps"
 
 
 def radians(evidence):

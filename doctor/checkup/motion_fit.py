@@ -8,7 +8,7 @@ from collections import namedtuple
 
 import numpy as np
 
-from . import fits
+from . import fits, signals
 
 DEGREE = np.pi / 180.0
 IN_ODOM_FRAME = "twist in the odometry's frame"
@@ -18,6 +18,7 @@ LEAST_GAIN = 0.3
 LEAST_SURENESS = 2.5
 LEAST_SHARE = 0.7
 LEAST_WINDOWS = 4
+SLOWEST_VELOCITY_S = 1.1  # between velocities that can be integrated
 TURNING_SHARE = 0.3       # of the windows: the others are mostly straight and would say nothing of a yaw rate
 LEAST_TURNING, MOST_TURNING = 8, 40  # windows
 GOOD_FIT = 0.35           # of the window's extent that is left, for its scale to count
@@ -46,37 +47,68 @@ def extent(places):
     return float(np.sqrt(np.mean(np.abs(places - np.mean(places)) ** 2)))
 
 
-def read(name, source, track, t, q, parts, lag=0.0):
+def read(name, source, track, t, q, parts):
     """How a track fits places in each window."""
-    all_fits = fits.window_fits(track, t, q, parts, lag, free_scale=True)
+    all_fits = fits.window_fits(track, t, q, parts, free_scale=True)
     left = np.array([np.median(np.abs(each.residuals)) / max(extent(q[part]), 1e-6)
                      for each, part in zip(all_fits, parts)])
     return Reading(name, source, left, np.array([each.scale for each in all_fits]),
                    np.array([each.rotation for each in all_fits]), np.array([np.mean(t[part]) for part in parts]))
 
 
-def readings_of(evidence, lag=0.0):
-    """All readings of the motion against the fixes, the plain ones first; empty where there is nothing to compare."""
-    if evidence.fixes is None or not evidence.tracks:
+def read_unturned(name, p, t, q, parts):
+    """As read(), of places p whose axes are those of q: without a rotation, which would hide what is to be seen."""
+    lefts, scales = [], []
+    for part in parts:
+        pc, qc, weights = p[part] - np.median(p[part]), q[part] - np.median(q[part]), np.ones(part.stop - part.start)
+        for _ in range(fits.ITERATIONS):
+            pc = pc - np.sum(weights * pc) / np.sum(weights)
+            qc = qc - np.sum(weights * qc) / np.sum(weights)
+            power = np.sum(weights * np.abs(pc) ** 2)
+            scale = max(float(np.sum(weights * np.real(np.conj(pc) * qc)) / power), 0.0) if power > 0.0 else 0.0
+            size = np.abs(qc - scale * pc)
+            weights = 1.0 / (1.0 + (size / max(np.median(size), 1e-6)) ** 2)
+        lefts.append(np.median(size) / max(extent(q[part]), 1e-6))
+        scales.append(scale)
+    return Reading(name, "", np.array(lefts), np.array(scales), np.zeros(len(parts)), np.array(
+        [np.mean(t[part]) for part in parts]))
+
+
+def readings_of(evidence):
+    """All readings of the motion against the receiver's, the plain ones first; empty where there is nothing to compare.
+
+    The receiver's velocity is taken where it is known to be good, else the fixes.
+    """
+    if not evidence.tracks or (evidence.fixes is None and not evidence.velocity_is_good):
         return []
-    t, q, _ = evidence.fixes
     odometry_t, velocity, rate = evidence.motion
     plain = evidence.tracks["odometry"]
+    by_velocity = evidence.velocity_is_good and signals.period(evidence.velocities[0]) < SLOWEST_VELOCITY_S
+    if not by_velocity and evidence.fixes is None:
+        return []
+    if by_velocity:
+        # Its integral: smoother than fixes, and without their jumps.
+        velocity_t, values = evidence.velocities
+        t, q = velocity_t, fits.Track(velocity_t, values, np.zeros(len(values))).place
+    else:
+        t, q = evidence.fixes[:2]
     parts = useful_windows(plain, t, q, odometry_t)
+    if by_velocity:
+        parts = [part for part in parts if np.max(np.diff(t[part])) < fits.LONGEST_GAP_S]
     if len(parts) < 2:
         return []
     parts = most_turning(evidence.tracks.get("imu", plain), t, parts)
 
-    found = [read("as it is", "odometry", plain, t, q, parts, lag)]
+    found = [read("as it is", "odometry", plain, t, q, parts)]
     others = [("in degrees", rate * DEGREE), ("reversed", -rate), ("reversed and in degrees", -rate * DEGREE)]
-    found += [read(name, "odometry", fits.Track(odometry_t, velocity, other), t, q, parts, lag) for name, other in others]
+    found += [read(name, "odometry", fits.Track(odometry_t, velocity, other), t, q, parts) for name, other in others]
     fixed = fits.Track(odometry_t, velocity, np.zeros_like(rate))
-    found.append(read(IN_ODOM_FRAME, "odometry", fixed, t, q, parts, lag))
+    found.append(read(IN_ODOM_FRAME, "odometry", fixed, t, q, parts))
     imu = evidence.imu_rate_at(odometry_t)
     if imu is not None:
         for name, other in (("as it is", imu), ("in degrees", imu * DEGREE), ("reversed", -imu),
                             ("reversed and in degrees", -imu * DEGREE)):
-            found.append(read(name, "imu", fits.Track(odometry_t, velocity, other), t, q, parts, lag))
+            found.append(read(name, "imu", fits.Track(odometry_t, velocity, other), t, q, parts))
     return found
 
 

@@ -9,10 +9,10 @@ from .units import SPEED_UNITS, name_of
 
 LEAST_WINDOWS = 4
 CONCENTRATED = 0.8         # length of the mean direction of the windows' rotations
-TURNED_RAD = 0.35          # east and north are not where they should be; good receivers have less than 0.1
 GOOD_LEFT = 0.5            # of the extent that is left, at the most, for the fixes to say anything
 GAIN, SURE = 0.4, 2.5      # of another reading, as in motion_fit
-BODY_SHARE = 0.15          # of the speed that is to the side, at the most, in the robot's own frame
+BODY_SHARE = 0.06          # of the speed that is to the side, at the most, in the robot's own frame
+FORWARD_SHARE = 0.85       # of the velocities that point forward, in the robot's own frame
 SCALE_WITHIN = 0.2
 
 
@@ -67,21 +67,32 @@ def directions(evidence):
     parts = [part for part in motion_fit.useful_windows(track, t, q, vt) if motion_fit.extent(q[part]) > 0.25 * LEAST_WAY_M]
     if len(parts) < LEAST_WINDOWS:
         return [passed(name, "{}: too little driving to compare it with the fixes".format(topic))]
-    plain = motion_fit.read("as it is", "velocity", track, t, q, parts)
-    mirrored = motion_fit.read("mirrored", "velocity", integrated(vt, np.conj(velocity)), t, q, parts)
+    place = track.place_at(t)
+    plain = motion_fit.read_unturned("as it is", place, t, q, parts)
+    free = motion_fit.read("turned", "", track, t, q, parts)
+    mirrored = motion_fit.read_unturned("mirrored", 1j * np.conj(place), t, q, parts)
     body = body_reading(evidence, vt, velocity, t, q, parts)
     values = dict(left=signals.median(plain.left))
-    if body is not None and motion_fit.gain(body, plain)[0] > GAIN and motion_fit.gain(body, plain)[1] > SURE:
+    if body is not None and better(body, plain) and not better(mirrored, body):
         return [failed(name, "{}: it is in the robot's own frame (x forward), not east and north: {:.0f} % of it is to the "
                        "side, and the fixes go elsewhere".format(topic, 100.0 * side_share(velocity)),
                        "localization.launch velocity_topic:= of a velocity in east and north (ENU)",
                        side_share=side_share(velocity), **values)]
-    size, sure = motion_fit.gain(mirrored, plain)
-    if size > GAIN and sure > SURE:
-        return [mirrored_finding(evidence, name, topic, values)]
+    if better(mirrored, plain):
+        return [failed(name, "{}: a mirror image of where the fixes go: x is north and y is east (NED)".format(topic),
+                       "localization.launch velocity_topic:= of a velocity with x east and y north (ENU)", **values)]
+    if better(free, plain) and signals.median(plain.left) > GOOD_LEFT:
+        return turned(name, topic, free, values)
     if values["left"] > GOOD_LEFT:
         return [passed(name, "{}: the fixes are too rough to compare it with".format(topic), **values)]
-    return turned(name, topic, plain, values) + units(evidence, topic, plain)
+    evidence.velocity_is_good = True
+    return [passed(name, "{}: east and north, as the fixes move".format(topic), **values)] + units(evidence, topic, plain)
+
+
+def better(one, other):
+    """Whether one reading explains the fixes clearly better."""
+    gain, sureness = motion_fit.gain(one, other)
+    return gain > GAIN and sureness > SURE
 
 
 def side_share(velocity):
@@ -94,43 +105,21 @@ def side_share(velocity):
 def body_reading(evidence, vt, velocity, t, q, parts):
     """The velocity turned by the robot's heading, as it must be if it is in the robot's frame; None if it cannot be."""
     track = evidence.track()
-    if side_share(velocity) > BODY_SHARE or track is None:
+    if side_share(velocity) > BODY_SHARE or np.mean(velocity.real >= -0.1) < FORWARD_SHARE or track is None:
         return None
     turned_velocity = velocity * np.exp(1j * track.yaw_at(vt))
     return motion_fit.read("robot's frame", "velocity", integrated(vt, turned_velocity), t, q, parts)
 
 
-def mirrored_finding(evidence, name, topic, values):
-    """East and north are swapped: in the velocity, or in the fixes. The odometry knows."""
-    if fixes_mirrored(evidence):
-        return passed(name, "{}: a mirror image of the fixes, which are the wrong ones".format(topic), **values)
-    return failed(name, "{}: a mirror image of where the fixes go: x is north and y is east (NED)".format(topic),
-                  "localization.launch velocity_topic:= of a velocity with x east and y north (ENU)", **values)
-
-
-def fixes_mirrored(evidence):
-    """Whether the odometry too finds the fixes mirrored."""
-    track = evidence.track()
-    if track is None or evidence.fixes is None:
-        return False
-    t, q, _ = evidence.fixes
-    parts = motion_fit.most_turning(track, t, motion_fit.useful_windows(track, t, q, track.t))
-    plain = motion_fit.read("", "", track, t, q, parts)
-    other = motion_fit.read("", "", track, t, np.conj(q), parts)
-    return motion_fit.clearly_better(other, plain)
-
-
-def turned(name, topic, plain, values):
-    """A constant angle between the velocity and the way of the fixes."""
-    good = plain.left < GOOD_LEFT
-    mean = np.mean(np.exp(1j * plain.rotation[good]))
+def turned(name, topic, free, values):
+    """Another angle between the velocity and the way of the fixes."""
+    good = free.left < GOOD_LEFT
+    mean = np.mean(np.exp(1j * free.rotation[good])) if good.any() else 0.0
     angle = float(np.angle(mean))
     values = dict(values, angle_rad=angle, concentration=float(abs(mean)))
     if abs(mean) < CONCENTRATED:
         return [warned(name, "{}: fixes move in other directions than it says, each time another".format(topic),
                        "is it in the robot's frame, or smoothed? velocity_topic:= of one in east and north", **values)]
-    if abs(angle) < TURNED_RAD:
-        return [passed(name, "{}: east and north, as the fixes move".format(topic), **values)]
     what = "reversed" if abs(angle) > 2.8 else "turned by {:.0f} degrees".format(np.degrees(angle))
     return [failed(name, "{}: {} against where the fixes go".format(topic, what),
                    "velocity_topic:= of a velocity with x east and y north, not in the frame of odometry or robot",

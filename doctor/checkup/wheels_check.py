@@ -14,6 +14,7 @@ SURE = 3.0                 # standard errors
 MOVING_MPS = 0.7           # of the receiver's velocity: noise and reflections give less at rest
 DEAD_SHARE = 0.1           # of the receiver's speed: the wheels stand
 DEAD_S = 3.0               # for so long at a stretch
+FIX_SPAN_S = 8.0           # between fixes of which a velocity is made
 WARN_S, WARN_SHARE = 5.0, 0.01   # in all; poor receivers jump while the robot stands, up to 0.8 % of the time
 FAIL_S, FAIL_SHARE = 10.0, 0.05
 BACK_RAD = 2.4             # between motion and heading: backwards
@@ -113,7 +114,7 @@ def receiver_motion(evidence):
     if evidence.fixes is None:
         return None
     t, q, sigma = evidence.fixes
-    span = max(4.0, 2.0 * signals.period(t))
+    span = max(FIX_SPAN_S, 3.0 * signals.period(t))
     grid = np.arange(t[0] + span, t[-1] - span, 0.5 * span)
     if len(grid) < 4:
         return None
@@ -148,7 +149,8 @@ def dead(evidence):
     if total > max(WARN_S, WARN_SHARE * moving):
         text = "{}: the wheels stand for {:.0f} s while the receiver moves (from {:.0f} s on): a dead encoder or " \
             "slipping wheels".format(topic, total, standing[0][0] - evidence.recording.begin)
-        finding = failed if total > max(FAIL_S, FAIL_SHARE * moving) else warned
+        enough = max(FAIL_S, FAIL_SHARE * moving) * (1.0 if evidence.velocities is not None else 2.0)
+        finding = failed if total > enough else warned
         return [finding("odometry.wheels", text, "encoder and cable; {} takes the receiver's speed meanwhile, where it has "
                         "one (velocity_topic:=)".format(evidence.setup.section), standing_s=total)]
     if evidence.velocities is None:
