@@ -109,7 +109,7 @@ def imu_lag(evidence):
     # What is left unexplained, without and with the lag.
     without, within = 1.0 - lag.at_zero ** 2, max(1.0 - lag.correlation ** 2, 1e-6)
     gains = without / within > IMU_GAIN
-    if abs(offset) > IMU_FAIL_S + tolerance and gains and lag.unique:
+    if abs(offset) > IMU_FAIL_S + tolerance and gains and (lag.unique or abs(offset) < FAR_S):
         return [failed("clocks.imu_motion", text + named(offset), change, "or localization.launch use_imu:=false", **values)]
     if abs(offset) > IMU_WARN_S + tolerance and gains:
         return [warned("clocks.imu_motion", text, change, **values)]

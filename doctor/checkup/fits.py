@@ -22,20 +22,23 @@ Fit = namedtuple("Fit", "rotation scale residuals weights")
 
 def fit(p, q, centred=True, free_scale=False):
     """The rotation (and shift, and scale) of p that fits q best, with weights that outliers do not rule."""
-    weights = np.ones(len(p))
+    origin = p[0] if centred else 0.0
+    p = p - origin  # for digits: a track may be far from its beginning
+    q = q - q[0] if centred else q
+    weights, half = np.ones(len(p)), len(p) // 2
+    conjugate = np.conj(p)
+    # Sums as products, and a median by partition: this runs some thousand times.
     for _ in range(ITERATIONS):
-        total = np.sum(weights)
-        p_mean = np.sum(weights * p) / total if centred else 0.0
-        q_mean = np.sum(weights * q) / total if centred else 0.0
-        pc, qc = p - p_mean, q - q_mean
-        product = np.sum(weights * np.conj(pc) * qc)
-        power = np.sum(weights * np.abs(pc) ** 2)
+        total = weights.sum()
+        p_mean, q_mean = (weights @ p / total, weights @ q / total) if centred else (0.0, 0.0)
+        product = (weights * conjugate) @ q - total * np.conj(p_mean) * q_mean
+        power = weights @ (p.real ** 2 + p.imag ** 2) - total * abs(p_mean) ** 2
         rotation = product / abs(product) if abs(product) > 0.0 else 1.0
         scale = abs(product) / power if power > 0.0 else float("nan")
-        residuals = qc - rotation * pc * (scale if free_scale and np.isfinite(scale) else 1.0)
-        size = np.abs(residuals)
-        spread = max(np.median(size), 1e-6)
-        weights = 1.0 / (1.0 + (size / spread) ** 2)  # Cauchy's
+        factor = rotation * (scale if free_scale and np.isfinite(scale) else 1.0)
+        residuals = (q - q_mean) - factor * (p - p_mean)
+        squares = residuals.real ** 2 + residuals.imag ** 2
+        weights = 1.0 / (1.0 + squares / max(np.partition(squares, half)[half], 1e-12))  # Cauchy's
     return Fit(float(np.angle(rotation)), float(scale), residuals, weights)
 
 

@@ -14,6 +14,7 @@ GAIN, SURE = 0.4, 2.5      # of another reading, as in motion_fit
 BODY_SHARE = 0.06          # of the speed that is to the side, at the most, in the robot's own frame
 FORWARD_SHARE = 0.85       # of the velocities that point forward, in the robot's own frame
 SCALE_WITHIN = 0.2
+NED = "x is north and y is east (NED), a mirror image"
 
 
 def check(evidence):
@@ -70,16 +71,18 @@ def directions(evidence):
     place = track.place_at(t)
     plain = motion_fit.read_unturned("as it is", place, t, q, parts)
     free = motion_fit.read("turned", "", track, t, q, parts)
-    mirrored = motion_fit.read_unturned("mirrored", 1j * np.conj(place), t, q, parts)
+    wrong = [motion_fit.read_unturned(what, factor * (np.conj(place) if what == NED else place), t, q, parts)
+             for what, factor in ((NED, 1j), ("reversed", -1.0), ("turned by 90 degrees", 1j), ("turned by -90 degrees", -1j))]
+    other = motion_fit.best_of(wrong)
     body = body_reading(evidence, vt, velocity, t, q, parts)
     values = dict(left=signals.median(plain.left))
-    if body is not None and better(body, plain) and not better(mirrored, body):
+    if body is not None and better(body, plain) and not better(other, body):
         return [failed(name, "{}: it is in the robot's own frame (x forward), not east and north: {:.0f} % of it is to the "
                        "side, and the fixes go elsewhere".format(topic, 100.0 * side_share(velocity)),
                        "localization.launch velocity_topic:= of a velocity in east and north (ENU)",
                        side_share=side_share(velocity), **values)]
-    if better(mirrored, plain):
-        return [failed(name, "{}: a mirror image of where the fixes go: x is north and y is east (NED)".format(topic),
+    if better(other, plain):
+        return [failed(name, "{}: {} against where the fixes go".format(topic, other.name),
                        "localization.launch velocity_topic:= of a velocity with x east and y north (ENU)", **values)]
     if better(free, plain) and signals.median(plain.left) > GOOD_LEFT:
         return turned(name, topic, free, values)
@@ -120,8 +123,7 @@ def turned(name, topic, free, values):
     if abs(mean) < CONCENTRATED:
         return [warned(name, "{}: fixes move in other directions than it says, each time another".format(topic),
                        "is it in the robot's frame, or smoothed? velocity_topic:= of one in east and north", **values)]
-    what = "reversed" if abs(angle) > 2.8 else "turned by {:.0f} degrees".format(np.degrees(angle))
-    return [failed(name, "{}: {} against where the fixes go".format(topic, what),
+    return [failed(name, "{}: turned by {:.0f} degrees against where the fixes go".format(topic, np.degrees(angle)),
                    "velocity_topic:= of a velocity with x east and y north, not in the frame of odometry or robot",
                    **values)]
 
