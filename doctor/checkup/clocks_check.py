@@ -22,10 +22,10 @@ MOTION_WARN_S = 0.7                  # receivers that smooth are off by up to 0.
 # Good recordings have lags below 0.5 s, or true ones.
 MATTERS = 0.1
 HELPS_WARN, HELPS_FAIL = 4, 6          # windows
-HURTS_SHARE = 0.25                     # of those in which it helps
+HURTS_SHARE = 0.35                     # of those in which it helps
 COARSE = np.arange(-25.0, 25.01, 1.0)
 FINE = np.arange(-1.5, 1.51, 0.1)
-HALVES_AGREE_S = 1.2
+HALVES_AGREE_S, HALVES_AGREE_SHARE = 1.3, 0.15  # or this of the lag
 FOLLOWS = 0.5                       # of the motion that may be left, with the lag
 WINDOWS = 40
 
@@ -186,7 +186,8 @@ def motion_lag(track, t, q, of_velocity):
     found = fits.window_fits(track, t, q, parts, lags[best], of_velocity)
     left = [np.median(np.abs(each.residuals)) / max(size(q[part], of_velocity), 1e-6) for each, part in zip(found, parts)]
     follows = signals.median(left) < FOLLOWS
-    agrees = bool(abs(halves[0] - halves[1]) <= HALVES_AGREE_S and follows)
+    within = max(HALVES_AGREE_S, HALVES_AGREE_SHARE * abs(lags[best]))
+    agrees = bool(abs(halves[0] - halves[1]) <= within and follows)
     return float(lags[best]), int(np.sum(advantage > MATTERS)), int(np.sum(advantage < -MATTERS)), agrees
 
 

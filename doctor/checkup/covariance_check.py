@@ -6,9 +6,9 @@ from . import fits, motion_fit, signals
 from .evidence import LEAST_WAY_M
 from .finding import failed, passed, warned
 
-# Scatter about the track over half a minute, over the declared sigma. Good recordings have 0.2 to 1.2: what lasts longer
+# Scatter about the track over half a minute, over the declared sigma. Good recordings have 0.05 to 0.8: what lasts longer
 # than the window is not seen. Honest receivers between buildings are off by some.
-OVER_WARN, OVER_FAIL, OVER_FAIL_CONSTANT = 3.0, 20.0, 5.0
+OVER_WARN, OVER_FAIL, OVER_FAIL_CONSTANT = 2.0, 30.0, 10.0
 UNDER_WARN = 0.02
 MEDIAN_OF_RAYLEIGH = 1.1774    # of a length whose components have sigma 1
 UNRELATED = 0.5                # of a window's extent that is left: the track is not that of the fixes

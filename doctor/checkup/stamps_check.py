@@ -10,6 +10,7 @@ FEW = 0.01                  # share of messages that may be odd without being a 
 GAP_PERIODS = 5.0           # longer than so many periods is a gap ...
 LEAST_GAP_S = {"odometry": 0.5, "imu": 0.5, "fix": 10.0, "velocity": 10.0, "satellites": 30.0}  # ... and than this
 ODOMETRY_GAP_S = 2.0        # the parameter odometry_gap: after more the place is unknown and the localizer starts anew
+GAP_SHARE = 0.05            # of the time: more is no accident
 BACK_JUMP_S = 1.0           # the parameter time_jump: a clock that is set back by more starts everything anew
 FAR_FUTURE_S = 4.2e9        # s, after 2100
 UNIX_S = 1e9                # s, since 2001: smaller is no time of day
@@ -84,10 +85,12 @@ def gaps(name, kind, topic, t):
         topic, len(long), limit, steps[worst], t[worst] - t[0])
     values = dict(gaps=len(long), longest_s=float(steps[worst]))
     if kind == "odometry" and steps[worst] > ODOMETRY_GAP_S:
-        return [failed(name, text + ": there the place is lost, and the localizer starts anew",
-                       "why the odometry stops: driver, network, or a bag recorded on a full disk",
-                       "imm_ekf: {{expert: {{stamps: {{odometry_gap: {:.0f}.0}}}}}}  # only if it stood still".format(
-                           np.ceil(steps[worst]) + 1), **values)]
+        share = float(np.sum(steps[long]) / max(t[-1] - t[0], 1e-9))
+        finding = failed if share > GAP_SHARE else warned
+        return [finding(name, text + ": there the place is lost, and the localizer starts anew",
+                        "why the odometry stops: driver, network, or a bag recorded on a full disk",
+                        "imm_ekf: {{expert: {{stamps: {{odometry_gap: {:.0f}.0}}}}}}  # only if it stood still".format(
+                            np.ceil(steps[worst]) + 1), **values)]
     return [warned(name, text, "driver and network of " + topic, **values)]
 
 

@@ -5,11 +5,16 @@ usage: spoil_bag.py FAULT IN.bag OUT.bag [--pose]
 
 With --pose the odometry's pose is integrated anew from the spoilt twist, as by a driver that has the fault in its wheels.
 `spoil_bag.py --list` names the faults. Topics are taken by their types, as `doctor` takes them.
+
+`spoil_bag.py --table IN.bag` spoils a bag with each of them, runs doctor on it, and prints a table of what it said.
 """
 import argparse
+import json
 import math
 import os
+import subprocess
 import sys
+import tempfile
 
 import rosbag
 import rospy
@@ -18,6 +23,7 @@ sys.path.insert(0, os.path.join(os.path.dirname(os.path.realpath(__file__)), "..
 from checkup.bag_reader import topics_of  # noqa: E402
 from checkup.topic_choice import choose  # noqa: E402
 
+DOCTOR = os.path.join(os.path.dirname(os.path.realpath(__file__)), "..", "..", "doctor", "doctor")
 GAP_S = 6.0
 DEAD_S = 60.0
 DROP = object()
@@ -168,44 +174,44 @@ def scale_velocity(factor):
     return change
 
 
-# Fault: (kind of stream, what is done to each message).
+# Fault: (kind of stream, what is done to each message, words by which doctor names it).
 FAULTS = {
-    "yaw_rate_degrees": ("odometry", scale_rate(180.0 / math.pi)),
-    "yaw_rate_reversed": ("odometry", scale_rate(-1.0)),
-    "speed_kmh": ("odometry", scale_speed(3.6)),
-    "speed_mph": ("odometry", scale_speed(2.23694)),
-    "speed_mm": ("odometry", scale_speed(1000.0)),
-    "speed_reversed": ("odometry", scale_speed(-1.0)),
-    "speed_half": ("odometry", scale_speed(0.5)),
-    "speed_unsigned": ("odometry", unsigned),
-    "twist_in_odom_frame": ("odometry", twist_in_odom_frame),
-    "twist_zero": ("odometry", twist_zero),
-    "pose_zero": ("odometry", pose_zero),
-    "odometry_gap": ("odometry", gap),
-    "odometry_stamp_zero": ("odometry", stamp_zero),
-    "dead_encoder": ("odometry", dead_encoder),
-    "odom_frame_empty": ("odometry", odom_frame),
-    "imu_degrees": ("imu", imu_degrees),
-    "imu_ned": ("imu", imu_ned),
-    "imu_on_its_side": ("imu", imu_on_its_side),
-    "imu_clock": ("imu", shift(1.0)),
-    "imu_since_start": ("imu", since_start),
-    "fix_late": ("fix", shift(1.5)),
-    "fix_gps_time": ("fix", shift(18.0)),
-    "fix_stamp_zero": ("fix", stamp_zero),
-    "fix_frame_empty": ("fix", frame_empty),
-    "fix_swapped": ("fix", latlon_swapped),
-    "fix_e7": ("fix", scale_place(1e7)),
-    "fix_radians": ("fix", scale_place(math.pi / 180.0)),
-    "fix_status_never": ("fix", status_never),
-    "sigma_for_variance": ("fix", sigma_for_variance),
-    "covariance_tiny": ("fix", set_covariance(1e-4)),
-    "covariance_zero": ("fix", set_covariance(0.0)),
-    "velocity_in_body": ("velocity", velocity_in_body),
-    "velocity_ned": ("velocity", velocity_ned),
-    "velocity_kmh": ("velocity", scale_velocity(3.6)),
-    "velocity_reversed": ("velocity", scale_velocity(-1.0)),
-    "velocity_clock": ("velocity", shift(-2.0)),
+    "yaw_rate_degrees": ("odometry", scale_rate(180.0 / math.pi), "degrees per second"),
+    "yaw_rate_reversed": ("odometry", scale_rate(-1.0), "reversed"),
+    "speed_kmh": ("odometry", scale_speed(3.6), "km/h"),
+    "speed_mph": ("odometry", scale_speed(2.23694), "mph"),
+    "speed_mm": ("odometry", scale_speed(1000.0), "mm/s"),
+    "speed_reversed": ("odometry", scale_speed(-1.0), "reversed"),
+    "speed_half": ("odometry", scale_speed(0.5), "half"),
+    "speed_unsigned": ("odometry", unsigned, "without sign"),
+    "twist_in_odom_frame": ("odometry", twist_in_odom_frame, "frame"),
+    "twist_zero": ("odometry", twist_zero, "twist is zero"),
+    "pose_zero": ("odometry", pose_zero, "twist only"),
+    "odometry_gap": ("odometry", gap, "gaps of"),
+    "odometry_stamp_zero": ("odometry", stamp_zero, "stamps are zero"),
+    "dead_encoder": ("odometry", dead_encoder, "dead encoder"),
+    "odom_frame_empty": ("odometry", odom_frame, "frame_id is empty"),
+    "imu_degrees": ("imu", imu_degrees, "degrees per second"),
+    "imu_ned": ("imu", imu_ned, "NED"),
+    "imu_on_its_side": ("imu", imu_on_its_side, "not vertical"),
+    "imu_clock": ("imu", shift(1.0), "ahead of"),
+    "imu_since_start": ("imu", since_start, "another time"),
+    "fix_late": ("fix", shift(1.5), "ahead of"),
+    "fix_gps_time": ("fix", shift(18.0), "GPS time"),
+    "fix_stamp_zero": ("fix", stamp_zero, "stamps are zero"),
+    "fix_frame_empty": ("fix", frame_empty, "frame_id is empty"),
+    "fix_swapped": ("fix", latlon_swapped, "swapped"),
+    "fix_e7": ("fix", scale_place(1e7), "10^7"),
+    "fix_radians": ("fix", scale_place(math.pi / 180.0), "radians"),
+    "fix_status_never": ("fix", status_never, "status -1"),
+    "sigma_for_variance": ("fix", sigma_for_variance, "sigma in place"),
+    "covariance_tiny": ("fix", set_covariance(1e-4), "scatters by"),
+    "covariance_zero": ("fix", set_covariance(0.0), "all zero"),
+    "velocity_in_body": ("velocity", velocity_in_body, "robot's own frame"),
+    "velocity_ned": ("velocity", velocity_ned, "NED"),
+    "velocity_kmh": ("velocity", scale_velocity(3.6), "km/h"),
+    "velocity_reversed": ("velocity", scale_velocity(-1.0), "reversed"),
+    "velocity_clock": ("velocity", shift(-2.0), "after their stamps"),
 }
 # Those after whose name the time of receipt is the stamp, too: as in a bag made of tables.
 BOTH_TIMES = "_both_times"
@@ -242,7 +248,7 @@ class PoseIntegrator:
 def spoil(fault, source, target, with_pose=False):
     """Copies a bag with the fault in it. Raises ValueError where the bag has no such stream."""
     both = fault.endswith(BOTH_TIMES)
-    kind, change = FAULTS[fault[:-len(BOTH_TIMES)] if both else fault]
+    kind, change, _ = FAULTS[fault[:-len(BOTH_TIMES)] if both else fault]
     with rosbag.Bag(source) as bag:
         chosen = choose(topics_of([bag]), {})
         if kind not in chosen:
@@ -263,10 +269,37 @@ def spoil(fault, source, target, with_pose=False):
                 out.write(name, message, stamp)
 
 
+def judge(fault, source, folder):
+    """(level, check, text) of the finding that names a fault of a bag; None for each where there is none."""
+    target, report = os.path.join(folder, "spoilt.bag"), os.path.join(folder, "report.json")
+    spoil(fault, source, target)
+    subprocess.run([sys.executable, "-B", DOCTOR, target, "--json", report], stdout=subprocess.DEVNULL, check=False)
+    with open(report, encoding="utf-8") as stream:
+        findings = json.load(stream)["findings"]
+    named = [each for each in findings if each["level"] != "PASS" and FAULTS[fault][2] in each["text"]]
+    best = min(named, key=lambda each: each["level"], default={"level": None, "check": None, "text": None})
+    return best["level"], best["check"], best["text"]
+
+
+def print_table(source):
+    """A row a fault that the bag can have."""
+    print("| fault | said | check |\n|---|---|---|")
+    with tempfile.TemporaryDirectory() as folder:
+        for fault in FAULTS:
+            try:
+                level, check, _ = judge(fault, source, folder)
+            except ValueError:
+                continue
+            print("| `{}` | {} | {} |".format(fault, level or "–", "`{}`".format(check) if check else "–"), flush=True)
+
+
 def main():
     """The program."""
     if sys.argv[1:] == ["--list"]:
         print("\n".join(FAULTS))
+        return
+    if len(sys.argv) == 3 and sys.argv[1] == "--table":
+        print_table(sys.argv[2])
         return
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("fault", help="a name of --list, with {} also its times of receipt are changed".format(BOTH_TIMES))
