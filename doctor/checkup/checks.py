@@ -2,7 +2,7 @@
 
 import traceback
 
-from . import (antenna_check, clocks_check, covariance_check, fix_check, frames_check, imu_check, motion_fit,
+from . import (antenna_check, clocks_check, covariance_check, dop_check, fix_check, frames_check, imu_check, motion_fit,
                odometry_check, satellites_check, stamps_check, topics_check, velocity_check, wheels_check, yaw_check)
 from .evidence import Evidence
 from .finding import FAIL, LEVELS, WARN, warned
@@ -11,7 +11,7 @@ from .finding import FAIL, LEVELS, WARN, warned
 # the same: clocks before places, places before velocities, all before the wheels.
 ORDER = (topics_check.check, stamps_check.check, frames_check.check, imu_check.check, odometry_check.check,
          clocks_check.check, fix_check.check, velocity_check.check, clocks_check.check_velocity, yaw_check.check,
-         wheels_check.check, covariance_check.check, antenna_check.check, satellites_check.check)
+         wheels_check.check, covariance_check.check, dop_check.check, antenna_check.check, satellites_check.check)
 
 
 def examine(recording, setup, report=lambda name: None):

@@ -2,9 +2,13 @@
 
 import math
 
+import numpy as np
+
 from .recording import STRONG_DBHZ
 
-RESIDUAL_UNIT_M = 0.1  # of ublox_msgs/NavSAT
+LEAST_RANGES = 5       # one more than unknowns
+MOST_CONDITION = 1e6   # of the normal matrix: beyond it there is no fix
+UNKNOWN_DILUTION = (float("nan"), float("nan"))
 
 
 def seconds(stamp):
@@ -57,14 +61,34 @@ def satellites(message, received):
     return (seconds(message.header.stamp), received, len(all_of), sum(1 for each in all_of if each.cn0 > 0.0),
             sum(1 for each in all_of if each.cn0 >= STRONG_DBHZ),
             sum(1 for each in all_of if math.isfinite(each.azimuth) and math.isfinite(each.elevation)),
-            sum(1 for each in all_of if math.isfinite(each.pseudorange_residual)))
+            sum(1 for each in all_of if math.isfinite(each.pseudorange_residual))) + dilution(all_of)
+
+
+def dilution(all_of):
+    """Squared dilution of precision, east and north, of the satellites in the fix as far as that is known; else NaN."""
+    known = [each for each in all_of if math.isfinite(each.azimuth) and math.isfinite(each.elevation) and each.cn0 > 0.0]
+    for chosen in ([each for each in known if math.isfinite(each.pseudorange_residual)],
+                   [each for each in known if each.used == 1], known):
+        if len(chosen) >= LEAST_RANGES:
+            break
+    else:
+        return UNKNOWN_DILUTION
+    azimuth, elevation = (np.array([getattr(each, name) for each in chosen]) for name in ("azimuth", "elevation"))
+    level = np.cos(elevation)
+    design = np.column_stack([level * np.sin(azimuth), level * np.cos(azimuth), np.sin(elevation), np.ones(len(chosen))])
+    normal = design.T @ design
+    if np.linalg.cond(normal) > MOST_CONDITION:
+        return UNKNOWN_DILUTION
+    inverse = np.linalg.inv(normal)
+    return float(inverse[0, 0]), float(inverse[1, 1])
 
 
 def nav_sat(message, received):
     """ublox_msgs/NavSAT, which has no header: the time of its receipt stands for its stamp."""
     heard = [each for each in message.sv if each.cno > 0]
     return (received, received, len(message.sv), len(heard), sum(1 for each in heard if each.cno >= STRONG_DBHZ),
-            sum(1 for each in heard if abs(each.elev) <= 90), sum(1 for each in heard if each.prRes != 0))
+            sum(1 for each in heard if abs(each.elev) <= 90), sum(1 for each in heard if each.prRes != 0)) + \
+        UNKNOWN_DILUTION
 
 
 def gps_status(message, received):
@@ -73,7 +97,7 @@ def gps_status(message, received):
     status = status if hasattr(status, "satellite_visible_snr") else message
     snr = status.satellite_visible_snr
     return (seconds(message.header.stamp), received, len(snr), sum(1 for each in snr if each > 0),
-            sum(1 for each in snr if each >= STRONG_DBHZ), len(status.satellite_visible_azimuth), 0)
+            sum(1 for each in snr if each >= STRONG_DBHZ), len(status.satellite_visible_azimuth), 0) + UNKNOWN_DILUTION
 
 
 # What is understood: (kind, function that makes the row) by type.

@@ -14,7 +14,8 @@ COLUMNS = {
     "fix": ("lat", "lon", "alt", "status", "cov_xx", "cov_xy", "cov_yy", "cov_zz", "cov_type"),
     "velocity": ("vx", "vy", "vz", "cov_xx", "cov_yy"),
     "imu": ("wx", "wy", "wz", "ax", "ay", "az", "qx", "qy", "qz", "qw", "orientation_cov", "rate_cov"),
-    "satellites": ("count", "heard", "strong", "directions", "residuals"),  # numbers of satellites with each
+    # Numbers of satellites with each; and the variances of east and north for ranges of 1 m (the squares of their DOP).
+    "satellites": ("count", "heard", "strong", "directions", "residuals", "dop_xx", "dop_yy"),
 }
 KINDS = tuple(COLUMNS)
 STRONG_DBHZ = 35.0  # C/N0 of a signal in line of sight; reflected ones are mostly weaker

@@ -1,105 +1,17 @@
-"""The doctor: each of its checks on synthetic drives, clean and with one fault; the program on bags made here."""
+"""The doctor's checks: each on synthetic drives, clean and with one fault."""
 import itertools
 import json
 import math
 import os
-import subprocess
 import sys
-import tempfile
 import unittest
 
 import numpy as np
 
-ROOT = os.path.join(os.path.dirname(os.path.realpath(__file__)), "..", "..")
-PROGRAM = os.path.join(ROOT, "doctor", "doctor")
-sys.path.insert(0, os.path.join(ROOT, "doctor"))
 sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
-from checkup import checks, evidence, fits, page, setup, signals, text  # noqa: E402
-from checkup.recording import COLUMNS, Recording, Stream, Topic, Transforms  # noqa: E402
+from doctor_drive import COLUMNS, LATITUDE, LONGITUDE, T0, Recording, Topic, checks, drive, examine, said, setup  # noqa: E402
+from checkup import evidence, fits, page, signals, text  # noqa: E402
 from checkup.topic_choice import choose  # noqa: E402
-
-T0 = 1.7e9
-LATITUDE, LONGITUDE = 48.1, 11.5
-METRES_A_DEGREE = 111194.0
-TYPES = {"odometry": "nav_msgs/Odometry", "fix": "sensor_msgs/NavSatFix", "imu": "sensor_msgs/Imu",
-         "velocity": "geometry_msgs/TwistWithCovarianceStamped", "satellites": "urban_gnss_localization/SatelliteArray"}
-TOPICS = {"odometry": "/odom", "fix": "/gps/fix", "imu": "/imu/data", "velocity": "/gps/velocity",
-          "satellites": "/gps/satellites"}
-FRAMES = {"odometry": "odom", "fix": "gps", "imu": "imu_link", "velocity": "gps", "satellites": "gps"}
-
-
-def stream(kind, t, columns, received=None):
-    """A stream out of columns by name; the others are zero."""
-    rows = np.zeros((len(t), 2 + len(COLUMNS[kind])))
-    rows[:, 0], rows[:, 1] = t, t + 0.02 if received is None else received
-    for name, values in columns.items():
-        rows[:, 2 + COLUMNS[kind].index(name)] = values
-    return Stream(kind, TOPICS[kind], rows, {FRAMES[kind]: len(t)}, {"base_link" if kind == "odometry" else "": len(t)})
-
-
-def drive(seconds=240.0, seed=1, lever=(0.0, 0.0), parts=("odometry", "fix", "imu", "velocity", "satellites")):
-    """A winding road with stops, turns to both sides: fixes of 0.5 m, wheels and gyroscope nearly perfect."""
-    random = np.random.RandomState(seed)
-    t = np.arange(0.0, seconds, 0.05)
-    speed = np.clip(2.0 + 1.5 * np.sin(2.0 * np.pi * t / 37.0), 0.0, 3.0) * (t > 5.0)
-    rate = (0.25 * np.sin(2.0 * np.pi * t / 29.0) + 0.1 * np.sin(2.0 * np.pi * t / 11.3) + 0.03) * (t > 5.0)
-    yaw = np.cumsum(rate) * 0.05
-    path = np.cumsum(speed * np.exp(1j * (yaw - 0.025 * rate))) * 0.05
-    streams = {}
-    if "odometry" in parts:
-        streams["odometry"] = stream("odometry", T0 + t, {
-            "x": path.real, "y": path.imag, "yaw": np.arctan2(np.sin(yaw), np.cos(yaw)), "quaternion_norm": 1.0,
-            "vx": speed + random.normal(0.0, 0.01, len(t)), "wz": rate + random.normal(0.0, 0.005, len(t)),
-            "twist_cov_x": 0.01})
-    if "imu" in parts:
-        streams["imu"] = stream("imu", T0 + t + 0.001, {
-            "wz": rate + random.normal(0.0, 0.002, len(t)), "az": 9.81, "orientation_cov": -1.0})
-    course = 0.7 + yaw  # the odometry starts with another heading than the map's
-    place = path * np.exp(0.7j) + (lever[0] + 1j * lever[1]) * np.exp(1j * course)
-    every = slice(0, None, 20)
-    k = len(t[every])
-    error = np.cumsum(random.normal(0.0, 0.1, k) + 1j * random.normal(0.0, 0.1, k))
-    error -= signals_trend(error)
-    fix = place[every] + error + random.normal(0.0, 0.2, k) + 1j * random.normal(0.0, 0.2, k)
-    variance = 1.0 + 0.3 * random.rand(k)
-    if "fix" in parts:
-        streams["fix"] = stream("fix", T0 + t[every], {
-            "lat": LATITUDE + fix.imag / METRES_A_DEGREE,
-            "lon": LONGITUDE + fix.real / METRES_A_DEGREE / math.cos(math.radians(LATITUDE)), "alt": 500.0,
-            "cov_xx": variance, "cov_yy": variance, "cov_zz": 3.0 * variance, "cov_type": 2.0})
-    if "velocity" in parts:
-        velocity = speed * np.exp(1j * course)
-        streams["velocity"] = stream("velocity", T0 + t[every], {
-            "vx": velocity[every].real + random.normal(0.0, 0.05, k),
-            "vy": velocity[every].imag + random.normal(0.0, 0.05, k), "cov_xx": 0.01, "cov_yy": 0.01})
-    if "satellites" in parts:
-        streams["satellites"] = stream("satellites", T0 + t[every], {
-            "count": 14.0, "heard": 12.0, "strong": 9.0, "directions": 12.0, "residuals": 9.0})
-    transforms = Transforms()
-    transforms.add("odom", "base_link", (0.0,) * 6 + (1.0,), "/base", False)
-    transforms.add("base_link", "gps", tuple(lever) + (1.0, 0.0, 0.0, 0.0, 1.0), "/tf", True)
-    transforms.add("base_link", "imu_link", (0.0,) * 6 + (1.0,), "/tf", True)
-    recording = Recording("drive.bag", [Topic(TOPICS[kind], TYPES[kind], len(each)) for kind, each in streams.items()],
-                          streams, transforms, T0, T0 + seconds)
-    recording.choices = {kind: (TOPICS[kind], "its usual name") for kind in streams}
-    return recording
-
-
-def signals_trend(values):
-    """Takes the mean out of an error that wanders."""
-    return np.mean(values)
-
-
-def examine(recording, told=setup.DEFAULTS):
-    """The findings."""
-    with np.errstate(all="ignore"):
-        return checks.examine(recording, told)[0]
-
-
-def said(findings, level=None):
-    """Checks and texts of the findings, of a level."""
-    return "\n".join("{} {}: {}".format(each.level, each.check, each.text) for each in findings
-                     if level is None or each.level == level)
 
 
 class CleanDriveTest(unittest.TestCase):
@@ -274,6 +186,30 @@ class FaultTest(unittest.TestCase):
                 self.assertNotIn("cannot be checked", said(findings))
 
 
+class SigmaTest(unittest.TestCase):
+    """sigma in place of sigma^2, by how it follows the satellites' geometry."""
+
+    def findings(self, power, across=1.0):
+        recording = drive(seconds=150.0)
+        random = np.random.RandomState(5)
+        recording.satellites.dop_xx = np.exp(random.normal(0.0, 0.5, len(recording.satellites)))
+        recording.satellites.dop_yy = recording.satellites.dop_xx * np.exp(across * random.normal(0.0, 0.5, len(
+            recording.satellites)))
+        fix = recording.fix
+        fix.cov_xx, fix.cov_yy = ((4.0 * dop) ** power for dop in (recording.satellites.dop_xx, recording.satellites.dop_yy))
+        if not across:
+            fix.cov_yy = fix.cov_xx
+        return said(examine(recording), "WARN")
+
+    def test_variances_pass(self):
+        self.assertNotIn("covariance.sigma", self.findings(1.0))
+        self.assertNotIn("covariance.sigma", self.findings(1.0, 0.0))
+
+    def test_sigma_is_named(self):
+        self.assertIn("sigma in place of sigma^2", self.findings(0.5))
+        self.assertIn("sigma in place of sigma^2", self.findings(0.5, 0.0))
+
+
 class OddInputTest(unittest.TestCase):
     def test_never_stumbles(self):
         """Not finite, one message, all the same, far apart, in another order."""
@@ -379,111 +315,6 @@ class ModuleTest(unittest.TestCase):
         html = page.page(found, findings)
         self.assertEqual(2, html.count('src="data:image/png;base64,'))
         self.assertNotIn("http", html.replace("http-equiv", ""))
-
-
-class ProgramTest(unittest.TestCase):
-    """The program on bags that are written here."""
-
-    @classmethod
-    def setUpClass(cls):
-        cls.folder = tempfile.TemporaryDirectory()
-        cls.addClassCleanup(cls.folder.cleanup)
-        cls.bag = os.path.join(cls.folder.name, "drive.bag")
-        write_bag(cls.bag, drive(seconds=90.0, parts=("odometry", "fix", "imu", "velocity")))
-
-    def run_doctor(self, *arguments):
-        return subprocess.run([sys.executable, "-B", PROGRAM] + list(arguments), stdout=subprocess.PIPE,
-                              stderr=subprocess.PIPE, universal_newlines=True, timeout=60, cwd=self.folder.name)
-
-    def test_a_good_bag(self):
-        done = self.run_doctor("drive.bag", "--json", "a.json", "--html", "a.html")
-        self.assertEqual(0, done.returncode, done.stdout + done.stderr)
-        self.assertIn("odometry:   /odom (its usual name)", done.stdout)
-        self.assertTrue(done.stdout.splitlines()[-1].startswith("summary: 0 FAIL"))
-        with open(os.path.join(self.folder.name, "a.json"), encoding="utf-8") as stream_of:
-            self.assertEqual(0, json.load(stream_of)["exit_code"])
-        self.assertGreater(os.path.getsize(os.path.join(self.folder.name, "a.html")), 10000)
-
-    def test_spoilt_bags(self):
-        import spoil_bag
-        for fault, words in (("speed_kmh", "km/h"), ("imu_ned", "NED"), ("velocity_in_body", "robot's own frame")):
-            path = os.path.join(self.folder.name, fault + ".bag")
-            spoil_bag.spoil(fault, self.bag, path)
-            done = self.run_doctor(path, "--quiet")
-            self.assertEqual(1, done.returncode, fault + done.stdout + done.stderr)
-            self.assertIn(words, done.stdout, fault)
-
-    def test_what_cannot_be_read(self):
-        with open(self.bag, "rb") as whole:
-            content = whole.read()
-        for name, data, words in (("cut.bag", content[:len(content) // 2], "rosbag reindex"), ("text.bag", b"text", "no bag"),
-                                  ("empty.bag", b"", "empty"), ("missing.bag", None, "No such file")):
-            if data is not None:
-                with open(os.path.join(self.folder.name, name), "wb") as target:
-                    target.write(data)
-            done = self.run_doctor(name)
-            self.assertEqual(2, done.returncode, done.stdout)
-            self.assertIn(words, done.stderr)
-            self.assertNotIn("Traceback", done.stderr)
-
-    def test_usage(self):
-        for arguments in ((), ("--live", "drive.bag"), ("drive.bag", "--params", "missing.yaml"),
-                          ("drive.bag", "--json", "missing/a.json"), ("--live", "--seconds", "0")):
-            done = self.run_doctor(*arguments)
-            self.assertEqual(2, done.returncode, arguments)
-            self.assertNotIn("Traceback", done.stderr)
-
-    def test_topics_that_are_asked_for(self):
-        done = self.run_doctor("drive.bag", "--fix-topic", "other", "--odom-topic", "/imu/data")
-        self.assertEqual(1, done.returncode)
-        self.assertIn("other was asked for and is not there", done.stdout)
-        self.assertIn("/imu/data has the type sensor_msgs/Imu, not nav_msgs/Odometry", done.stdout)
-
-
-def write_bag(path, recording):
-    """A recording as a bag."""
-    import rosbag
-    import rospy
-    from geometry_msgs.msg import TransformStamped, TwistWithCovarianceStamped
-    from nav_msgs.msg import Odometry
-    from sensor_msgs.msg import Imu, NavSatFix
-    from tf2_msgs.msg import TFMessage
-    messages = []
-
-    def add(kind, one, k, message):
-        message.header.stamp = rospy.Time.from_sec(one.t[k])
-        message.header.frame_id = FRAMES[kind]
-        messages.append((one.received[k], TOPICS[kind], message))
-
-    for k in range(len(recording.odometry)):
-        one, message = recording.odometry, Odometry(child_frame_id="base_link")
-        message.pose.pose.position.x, message.pose.pose.position.y = one.x[k], one.y[k]
-        message.pose.pose.orientation.z, message.pose.pose.orientation.w = math.sin(one.yaw[k] / 2), math.cos(one.yaw[k] / 2)
-        message.twist.twist.linear.x, message.twist.twist.angular.z = one.vx[k], one.wz[k]
-        add("odometry", one, k, message)
-    for k in range(len(recording.imu)):
-        message = Imu()
-        message.angular_velocity.z, message.linear_acceleration.z = recording.imu.wz[k], recording.imu.az[k]
-        message.orientation_covariance[0] = -1.0
-        add("imu", recording.imu, k, message)
-    for k in range(len(recording.fix)):
-        one = recording.fix
-        message = NavSatFix(latitude=one.lat[k], longitude=one.lon[k], altitude=500.0, position_covariance_type=2)
-        message.position_covariance = [one.cov_xx[k], 0.0, 0.0, 0.0, one.cov_yy[k], 0.0, 0.0, 0.0, one.cov_zz[k]]
-        add("fix", one, k, message)
-    for k in range(len(recording.velocity)):
-        message = TwistWithCovarianceStamped()
-        message.twist.twist.linear.x, message.twist.twist.linear.y = recording.velocity.vx[k], recording.velocity.vy[k]
-        add("velocity", recording.velocity, k, message)
-    transforms = TFMessage()
-    for parent, child in recording.transforms.publishers:
-        transform = TransformStamped(child_frame_id=child)
-        transform.header.frame_id, transform.transform.rotation.w = parent, 1.0
-        transforms.transforms.append(transform)
-    messages.append((T0, "/tf_static", transforms))
-    with rosbag.Bag(path, "w") as bag:
-        for received, topic, message in sorted(messages, key=lambda each: each[0]):
-            bag.write(topic, message, rospy.Time.from_sec(received))
 
 
 if __name__ == "__main__":
