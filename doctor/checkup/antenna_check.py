@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from . import fits, motion_fit, signals
+from . import fits, motion_fit
 from .evidence import LEAST_WAY_M
 from .finding import passed, warned
 

@@ -7,8 +7,8 @@ from . import (antenna_check, clocks_check, covariance_check, dop_check, fix_che
 from .evidence import Evidence
 from .finding import FAIL, LEVELS, WARN, warned
 
-# What a check finds wrong is put right in the evidence where that can be done, so that those after it do not complain of
-# the same: clocks before places, places before velocities, all before the wheels.
+# What a check finds wrong is put right in the evidence where that can be done, so that those after it do not complain
+# of the same: clocks before places, places before velocities, all before the wheels.
 ORDER = (topics_check.check, stamps_check.check, frames_check.check, imu_check.check, odometry_check.check,
          clocks_check.check, fix_check.check, velocity_check.check, clocks_check.check_velocity, yaw_check.check,
          wheels_check.check, covariance_check.check, dop_check.check, antenna_check.check, satellites_check.check)

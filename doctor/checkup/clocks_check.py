@@ -18,8 +18,8 @@ IMU_WARN_S, IMU_FAIL_S = 0.25, 0.8   # yaw rates of good recordings differ by up
 IMU_SURE = 0.6                       # correlation
 IMU_GAIN = 1.1                       # of what is left unexplained, by the lag
 MOTION_WARN_S = 0.7                  # receivers that smooth are off by up to 0.6 s
-# A lag is true where it makes the fit clearly better (by so much of its logarithm) in some windows, and hardly ever worse.
-# Good recordings have lags below 0.5 s, or true ones.
+# A lag is true where it makes the fit clearly better (by so much of its logarithm) in some windows, and hardly ever
+# worse. Good recordings have lags below 0.5 s, or true ones.
 MATTERS = 0.1
 HELPS_WARN, HELPS_FAIL = 4, 6          # windows
 HURTS_SHARE = 0.35                     # of those in which it helps
@@ -79,14 +79,16 @@ def arrivals(evidence):
             finding = failed if offset < -FAIL_AHEAD_S else warned
             if finding is failed and getattr(evidence, {"fix": "fixes", "velocity": "velocities"}.get(kind, ""), None):
                 evidence.shift(kind, -offset)  # so that the other checks see past it
-            findings.append(finding(name, "{}: stamps are {:.2f} s ahead of those of {}, by the times of arrival{}".format(
+            findings.append(finding(name,
+                                    "{}: stamps are {:.2f} s ahead of those of {}, by the times of arrival{}".format(
                 stream.topic, -offset, delays[reference][0].topic, named(offset)), *change, arrival_s=offset))
         elif offset > LATE_S:
             finding = failed if offset > FAR_S else warned
             findings.append(finding(name, "{}: messages arrive {:.2f} s after their stamps, {} {:.2f} s: {}{}".format(
                 stream.topic, delay, delays[reference][0].topic, base,
                 "a slow driver, or a clock that is behind", named(offset)), *change, arrival_s=offset))
-    return findings or [passed("clocks.arrival", "stamps and times of arrival agree between the streams, to {:.2f} s".format(
+    return findings or [passed("clocks.arrival",
+                               "stamps and times of arrival agree between the streams, to {:.2f} s".format(
         max(abs(delay - base) for _, delay in delays.values())))]
 
 
@@ -110,7 +112,8 @@ def imu_lag(evidence):
     without, within = 1.0 - lag.at_zero ** 2, max(1.0 - lag.correlation ** 2, 1e-6)
     gains = without / within > IMU_GAIN
     if abs(offset) > IMU_FAIL_S + tolerance and gains and (lag.unique or abs(offset) < FAR_S):
-        return [failed("clocks.imu_motion", text + named(offset), change, "or localization.launch use_imu:=false", **values)]
+        return [failed("clocks.imu_motion", text + named(offset), change, "or localization.launch use_imu:=false",
+                       **values)]
     if abs(offset) > IMU_WARN_S + tolerance and gains:
         return [warned("clocks.imu_motion", text, change, **values)]
     return [passed("clocks.imu_motion", "yaw rates of odometry and IMU agree in time, to {:.2f} s".format(abs(offset)),
@@ -144,7 +147,8 @@ def receiver_lag(evidence, kind, track, source=None):
         text += ": fixes come late and have the time of their arrival"  if kind == "fix" else ": it comes late"
     change = ["the driver's stamps: the time of the measurement, in UTC"]
     if abs(lag) <= FAR_S:
-        change.append("imm_ekf: {{expert: {{fix_delay: {:.1f}}}}}  # or leave it at auto, which finds up to 2 s".format(lag))
+        change.append("imm_ekf: {{expert: {{fix_delay: {:.1f}}}}}  # or leave it at auto, which finds up to 2 s".format(
+            lag))
         return [warned(name, text, *change, **values)]
     evidence.shift(kind, lag)  # so that the other checks see past it
     finding = failed if helps >= HELPS_FAIL else warned
@@ -184,7 +188,8 @@ def motion_lag(track, t, q, of_velocity):
     halves = [lags[np.argmin(np.mean(fine[:, begin::2], axis=1))] for begin in (0, 1)]
     advantage = costs([0.0])[0] - fine[best]
     found = fits.window_fits(track, t, q, parts, lags[best], of_velocity)
-    left = [np.median(np.abs(each.residuals)) / max(size(q[part], of_velocity), 1e-6) for each, part in zip(found, parts)]
+    left = [np.median(np.abs(each.residuals)) / max(size(q[part], of_velocity), 1e-6)
+            for each, part in zip(found, parts)]
     follows = signals.median(left) < FOLLOWS
     within = max(HALVES_AGREE_S, HALVES_AGREE_SHARE * abs(lags[best]))
     agrees = bool(abs(halves[0] - halves[1]) <= within and follows)

@@ -6,8 +6,8 @@ from . import fits, motion_fit, signals
 from .evidence import LEAST_WAY_M
 from .finding import failed, passed, warned
 
-# Scatter about the track over half a minute, over the declared sigma. Good recordings have 0.05 to 0.8: what lasts longer
-# than the window is not seen. Honest receivers between buildings are off by some.
+# Scatter about the track over half a minute, over the declared sigma. Good recordings have 0.05 to 0.8: what lasts
+# longer than the window is not seen. Honest receivers between buildings are off by some.
 OVER_WARN, OVER_FAIL, OVER_FAIL_CONSTANT = 2.0, 30.0, 10.0
 UNDER_WARN = 0.02
 MEDIAN_OF_RAYLEIGH = 1.1774    # of a length whose components have sigma 1
@@ -92,7 +92,8 @@ def undeclared(evidence, fix, scatter):
     return warned("covariance.declared", text + ": fix_sigma_default is taken{}".format(
         "; the fixes scatter by {:.2f} m within half a minute".format(scatter) if np.isfinite(scatter) else ""),
         "in the driver: a covariance (GST of NMEA, hAcc of u-blox)",
-        "{}: {{fix_sigma_default: {:.1f}}}  # m; the default is 4".format(evidence.setup.section, guess), scatter_m=scatter)
+        "{}: {{fix_sigma_default: {:.1f}}}  # m; the default is 4".format(evidence.setup.section, guess),
+        scatter_m=scatter)
 
 
 def is_multiple(values, step):
@@ -108,7 +109,8 @@ def patterns(evidence, fix, known, sigma, scatter):
     change = SECTION_CHANGE.format(evidence.setup.section, max(3.0, 2.0 * scatter) if np.isfinite(scatter) else 3.0)
     distinct = len(np.unique(np.round(cov_xx, 9)))
     if distinct == 1 and len(cov_xx) >= LEAST:
-        findings.append(warned("covariance.constant", "{}: the covariance never changes (sigma {:.3g} m): made up".format(
+        findings.append(warned("covariance.constant",
+                               "{}: the covariance never changes (sigma {:.3g} m): made up".format(
             topic, sigma[0]), change, sigma_m=float(sigma[0])))
     quadruple = np.mean(np.abs(cov_zz - 4.0 * cov_xx) < 1e-6 * cov_xx) > 0.98
     if quadruple and is_multiple(np.sqrt(cov_xx), 0.01) and np.mean(fix.cov_type[known] == 1) > 0.9:
@@ -126,7 +128,8 @@ def patterns(evidence, fix, known, sigma, scatter):
                                "localization.launch receiver:=gpsd  # takes GPSFix", change))
     if signals.median(sigma) < TINY_SIGMA_M and not (np.isfinite(scatter) and scatter < 2.0 * TINY_SIGMA_M):
         findings.append(warned("covariance.tiny", "{}: sigma is {:.2g} m: less than a receiver without corrections can "
-                               "have; degrees^2 in place of m^2, or made up".format(topic, signals.median(sigma)), change))
+                               "have; degrees^2 in place of m^2, or made up".format(topic, signals.median(sigma)),
+                               change))
     return findings
 
 
@@ -137,8 +140,8 @@ def size(evidence, fix, sigma, scatter, jitter):
     declared = max(signals.median(sigma), 1e-9)
     ratio, colour = scatter / declared, jitter / declared
     values = dict(scatter_m=scatter, declared_m=declared, ratio=ratio, coloured_ratio=colour)
-    text = "{}: declares sigma {:.3g} m, and scatters by {:.2f} m about the odometry's track within half a minute ({:.2g} " \
-        "times as much)".format(fix.topic, declared, scatter, ratio)
+    text = ("{}: declares sigma {:.3g} m, and scatters by {:.2f} m about the odometry's track within half a minute "
+            "({:.2g} times as much)".format(fix.topic, declared, scatter, ratio))
     change = SECTION_CHANGE.format(evidence.setup.section, max(3.0, 2.0 * scatter))
     constant = len(np.unique(np.round(sigma, 9))) == 1
     if ratio > OVER_WARN:
@@ -147,5 +150,6 @@ def size(evidence, fix, sigma, scatter, jitter):
         return [finding("covariance.size", text + causes, change, **values)]
     if ratio < UNDER_WARN:
         return [warned("covariance.size", text + ": far too cautious, or sigma is in cm", change, **values)]
-    return [passed("covariance.size", text + "; one fix after the other differs by {:.2g} of sigma: errors that last".format(
+    return [passed("covariance.size", text
+                   + "; one fix after the other differs by {:.2g} of sigma: errors that last".format(
         colour), **values)]

@@ -11,7 +11,8 @@ from .finding import warned
 SAME_S = 0.02
 LEAST = 100                    # fixes with satellites
 LEAST_CHANGE = 0.2             # standard deviation of the logarithm of the squared DOP
-# Good recordings have exponents of 1.0 to 1.7 over time, 0.9 to 1.15 east against north, where they are related so well.
+# Good recordings have exponents of 1.0 to 1.7 over time, 0.9 to 1.15 east against north, where they are related so
+# well.
 RELATED_TIME, RELATED_AXES = 0.9, 0.6
 SIGMA_TIME, SIGMA_AXES = (0.35, 0.65), (0.3, 0.68)
 ROUND = 1e-6
@@ -31,8 +32,8 @@ def check(evidence):
         limits = SIGMA_TIME
     if found is None or not limits[0] < found < limits[1]:
         return []
-    return [warned("covariance.sigma", "{}: the variances follow the satellites' geometry as standard deviations do (with the "
-                   "exponent {:.2f} of the squared DOP, in place of 1): sigma in place of sigma^2".format(
+    return [warned("covariance.sigma", "{}: the variances follow the satellites' geometry as standard deviations do "
+                   "(with the exponent {:.2f} of the squared DOP, in place of 1): sigma in place of sigma^2".format(
                        evidence.recording.fix.topic, found),
                    "in the driver: position_covariance is in m^2", "localization.launch receiver:=gpsd  # if it is "
                    "gpsd_client: takes GPSFix", exponent=found)]
@@ -48,7 +49,8 @@ def paired(fix, satellites):
     match = order[place]
     with np.errstate(invalid="ignore"):
         good = (np.abs(satellites.t[match] - fix.t) <= SAME_S) & (fix.cov_type > 0) & (fix.status >= 0)
-        good &= (fix.cov_xx > 0.0) & (fix.cov_yy > 0.0) & (satellites.dop_xx[match] > 0.0) & (satellites.dop_yy[match] > 0.0)
+        good &= (fix.cov_xx > 0.0) & (fix.cov_yy > 0.0)
+        good &= (satellites.dop_xx[match] > 0.0) & (satellites.dop_yy[match] > 0.0)
         good &= (fix.cov_xx < 1e12) & (fix.cov_yy < 1e12)
     if np.sum(good) < LEAST:
         return None

@@ -10,14 +10,23 @@ BELIEVABLE_MPS = 1e5     # also in mm/s; faster is no speed at all
 LONGEST_S = 2e5          # from the median stamp: more is another clock, not a drive
 
 
-def imu_yaw_rate(imu):
-    """The yaw rate that a localizer takes of an IMU: about the vertical where the message has an orientation, else z."""
+def imu_yaw_rate(imu, mounting=None):
+    """The yaw rate that a localizer takes, and which messages have an orientation.
+
+    It is that about the vertical where the message has an orientation, else about z of the robot as tf has the IMU
+    mounted (`mounting`: x, y, z and quaternion in base_link), else about its own z.
+    """
     quaternion = np.array([imu.qw, imu.qx, imu.qy, imu.qz])
     norm = np.sqrt(np.sum(quaternion ** 2, axis=0))
     oriented = (imu.orientation_cov != -1.0) & (np.abs(norm - 1.0) < 0.1)
     w, x, y, z = quaternion / np.where(norm > 0.0, norm, 1.0)
-    vertical = 2.0 * (x * z - w * y) * imu.wx + 2.0 * (y * z + w * x) * imu.wy + (1.0 - 2.0 * (x * x + y * y)) * imu.wz
-    return np.where(oriented, vertical, imu.wz), oriented
+    own = imu.wz if mounting is None else along_z(imu, *mounting[3:])
+    return np.where(oriented, along_z(imu, x, y, z, w), own), oriented
+
+
+def along_z(imu, x, y, z, w):
+    """The part of the angular velocity along the z axis of the frame that a quaternion turns into."""
+    return 2.0 * (x * z - w * y) * imu.wx + 2.0 * (y * z + w * x) * imu.wy + (1.0 - 2.0 * (x * x + y * y)) * imu.wz
 
 
 def stamps(stream, good=True):
@@ -41,7 +50,7 @@ class Evidence:
         self.recording = recording
         self.setup = setup
         self.motion = self._odometry(recording.odometry)          # (t, velocity in the robot's frame, yaw rate)
-        self.imu_rate = self._imu(recording.imu)                  # (t, yaw rate)
+        self.imu_rate = self._imu(recording.imu, self.imu_mounting())  # (t, yaw rate)
         self.fixes = self._fixes(recording.fix)                   # (t, place, declared sigma or NaN)
         self.velocities = self._velocities(recording.velocity)    # (t, velocity, east + i north)
         self.tracks = self._tracks()                              # {"odometry", "imu"}: fits.Track
@@ -59,10 +68,10 @@ class Evidence:
         return (t, vx + 1j * vy, wz) if len(t) > 1 else None
 
     @staticmethod
-    def _imu(imu):
+    def _imu(imu, mounting):
         if imu is None or len(imu) < 2:
             return None
-        rate, _ = imu_yaw_rate(imu)
+        rate, _ = imu_yaw_rate(imu, mounting)
         t, rate = signals.in_order(stamps(imu), rate)
         return (t, rate) if len(t) > 1 else None
 
@@ -85,6 +94,21 @@ class Evidence:
         believable = np.hypot(velocity.vx, velocity.vy) < BELIEVABLE_MPS
         t, east, north = signals.in_order(stamps(velocity, believable), velocity.vx, velocity.vy)
         return (t, east + 1j * north) if len(t) > 1 else None
+
+    def imu_mounting(self):
+        """The IMU's pose in base_link by a static transform; None where there is none."""
+        imu = self.recording.imu
+        if imu is None:
+            return None
+        return self.recording.transforms.static_pose(self.setup.base_link_frame, imu.frame().lstrip("/"))
+
+    def correct_yaw_rate(self, source, factor):
+        """Another unit or sign for a yaw rate, where the recorded one is wrong in a way that is known."""
+        if source == "odometry":
+            self.motion = self.motion[:2] + (factor * self.motion[2],)
+        else:
+            self.imu_rate = self.imu_rate[0], factor * self.imu_rate[1]
+        self.tracks = self._tracks()
 
     def _tracks(self):
         tracks = {}

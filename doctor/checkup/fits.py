@@ -103,7 +103,8 @@ def excitation(t, places):
     centred = t - np.mean(t)
     power = np.sum(centred ** 2)
     offset = places - np.mean(places)
-    return float(np.sqrt(np.mean(np.abs(offset - np.sum(centred * offset) / power * centred) ** 2))) if power > 0 else 0.0
+    straight = np.sum(centred * offset) / power * centred if power > 0.0 else 0.0
+    return float(np.sqrt(np.mean(np.abs(offset - straight) ** 2)))
 
 
 def most_excited(track, t, parts, count=MOST_WINDOWS):
@@ -126,4 +127,6 @@ def cost(fits, spread):
 
 def spread_of(fits):
     """The usual size of a residual over all windows."""
-    return max(signals.median(np.concatenate([np.abs(each.residuals) for each in fits])), 1e-3) if fits else float("nan")
+    if not fits:
+        return float("nan")
+    return max(signals.median(np.concatenate([np.abs(each.residuals) for each in fits])), 1e-3)

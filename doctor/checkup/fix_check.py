@@ -11,7 +11,8 @@ NO_FIX_WARN = 0.2          # share of messages with status -1
 FROZEN_S = 5.0
 LEAST_WAY_M = 10.0
 STRETCHED_GAIN = 0.1
-UNITS = ((1e7, "degrees times 10^7"), (1e6, "microdegrees"), (1e3, "millidegrees"), (100.0, "degrees and minutes (DDMM.MMMM)"))
+UNITS = ((1e7, "degrees times 10^7"), (1e6, "microdegrees"), (1e3, "millidegrees"),
+         (100.0, "degrees and minutes (DDMM.MMMM)"))
 
 
 def check(evidence):
@@ -42,8 +43,8 @@ def place(fix):
     if np.sum(outside) > FEW * count:
         size = signals.median(np.maximum(np.abs(lat[outside]), np.abs(lon[outside])))
         if signals.median(np.abs(lat[outside])) <= 180.0 and signals.median(np.abs(lon[outside])) <= 90.0:
-            return [failed(name, "{}: latitude {:.4f} is none, longitude {:.4f} could be one: latitude and longitude are "
-                           "swapped".format(topic, lat[outside][0], lon[outside][0]), change)]
+            return [failed(name, "{}: latitude {:.4f} is none, longitude {:.4f} could be one: latitude and longitude "
+                           "are swapped".format(topic, lat[outside][0], lon[outside][0]), change)]
         # The greatest unit that leaves a place.
         unit = next((text for value, text in UNITS if size / value > 1.0), "another unit")
         return [failed(name, "{}: latitude {:.6g}, longitude {:.6g} are no degrees: {}?".format(
@@ -67,8 +68,8 @@ def status(fix):
     text = "{}: {:.0f} % of the messages say that there is no fix (status -1)".format(fix.topic, 100.0 * without)
     good = is_place(fix.lat, fix.lon)
     if without > 0.9 and np.mean(good) > 0.5:
-        return [failed("fix.status", text + ", though they have places", "in the driver (or simulator): status.status = 0 "
-                       "where there is a fix", share=without)]
+        return [failed("fix.status", text + ", though they have places", "in the driver (or simulator): status.status "
+                       "= 0 where there is a fix", share=without)]
     if without > NO_FIX_WARN:
         return [warned("fix.status", text, "an antenna with a view of the sky, a better place, more constellations",
                        share=without)]
@@ -100,13 +101,13 @@ def swapped(evidence):
     if not verdict:
         return []
     if verdict == "perhaps":
-        return [warned("fix.swapped", "{}: the way is a mirror image of the odometry's: latitude and longitude are swapped, "
-                       "or the yaw rate has the reversed sign".format(fix.topic),
+        return [warned("fix.swapped", "{}: the way is a mirror image of the odometry's: latitude and longitude are "
+                       "swapped, or the yaw rate has the reversed sign".format(fix.topic),
                        "in the driver: latitude and longitude in this order")]
     if len(t) == len(evidence.fixes[0]):
         evidence.replace_places(other_q)  # so that the other checks see past it
-    return [failed("fix.swapped", "{}: the way fits the motion only with latitude and longitude swapped ({:.5f}, {:.5f} "
-                   "would be the place)".format(fix.topic, signals.median(fix.lon), signals.median(fix.lat)),
+    return [failed("fix.swapped", "{}: the way fits the motion only with latitude and longitude swapped ({:.5f}, "
+                   "{:.5f} would be the place)".format(fix.topic, signals.median(fix.lon), signals.median(fix.lat)),
                    "in the driver: latitude and longitude in this order")]
 
 
@@ -160,8 +161,8 @@ def radians(evidence):
     if ways[0] > 5.0 * LEAST_WAY_M and evidence.fixes is not None:
         _, q, _ = evidence.fixes
         if motion_fit.extent(q) < 0.03 * ways[0]:
-            return [failed("fix.place", "{}: latitude {:.4f}, longitude {:.4f}, and the fixes hardly move: radians in place "
-                           "of degrees".format(fix.topic, lat, lon), "in the driver: degrees")]
+            return [failed("fix.place", "{}: latitude {:.4f}, longitude {:.4f}, and the fixes hardly move: radians in "
+                           "place of degrees".format(fix.topic, lat, lon), "in the driver: degrees")]
     return [warned("fix.place", "{}: latitude {:.4f}, longitude {:.4f} is in the sea off Africa: radians in place of "
                    "degrees?".format(fix.topic, lat, lon), "in the driver: degrees")]
 
@@ -182,6 +183,7 @@ def frozen(evidence):
             first = t[begin - 1] if first is None else first
     if total == 0.0:
         return []
-    return [warned("fix.frozen", "{}: the same place for {:.0f} s in all while the robot drives (from {:.0f} s on)".format(
+    return [warned("fix.frozen",
+                   "{}: the same place for {:.0f} s in all while the robot drives (from {:.0f} s on)".format(
         evidence.recording.fix.topic, total, first - evidence.recording.begin),
         "in the driver: a message for each solution, status -1 where there is none", frozen_s=total)]

@@ -55,8 +55,8 @@ def odometry_frames(odometry, setup):
     findings = []
     frame, child = odometry.frame().lstrip("/"), odometry.child_frame().lstrip("/")
     if frame and frame != setup.odom_frame:
-        findings.append(warned("frames.odom_frame", "{}: frame_id is {}, odom_frame is {}: map -> odom would hang in the "
-                               "air".format(odometry.topic, frame, setup.odom_frame),
+        findings.append(warned("frames.odom_frame", "{}: frame_id is {}, odom_frame is {}: map -> odom would hang in "
+                               "the air".format(odometry.topic, frame, setup.odom_frame),
                                "localization.launch odom_frame:={}".format(frame), frame=frame))
     if not child:
         findings.append(warned("frames.base_link_frame", "{}: child_frame_id is empty or missing: whose twist it is is "
@@ -79,7 +79,8 @@ def odom_tf(recording, setup):
         return [warned("frames.tf_odom", "no tf in it: {} -> {} cannot be checked".format(frame, child),
                        "record.launch records /tf and /tf_static")]
     if not tf.connected(frame, child):
-        return [warned("frames.tf_odom", "nobody broadcasts {} -> {}: map -> odom alone does not place the robot".format(
+        return [warned("frames.tf_odom",
+                       "nobody broadcasts {} -> {}: map -> odom alone does not place the robot".format(
             frame, child), "the odometry's driver: publish_odom_tf: true (or its own name for that)")]
     return [passed("frames.tf_odom", "tf leads from {} to {}".format(frame, child))]
 
@@ -127,6 +128,7 @@ def map_tf(recording, setup):
             setup.odom_frame, ", ".join(parents)), "localization.launch map_frame:={}, or publish_tf:=false".format(
                 parents[0]))]
     if publishers and not recording.is_live:
-        return [warned("frames.tf_map", "the recording has {} -> {} already: beside a localizer there would be two".format(
+        return [warned("frames.tf_map",
+                       "the recording has {} -> {} already: beside a localizer there would be two".format(
             *edge), "replay.launch tf_topics:='' , or localization.launch publish_tf:=false")]
     return []

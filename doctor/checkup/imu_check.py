@@ -36,7 +36,8 @@ def gravity(evidence, imu):
         return []
     findings = []
     if 0.8 < size < 1.2:
-        findings.append(warned("imu.acceleration", "{}: gravity is {:.2f}: in g in place of m/s^2".format(imu.topic, size),
+        findings.append(warned("imu.acceleration",
+                               "{}: gravity is {:.2f}: in g in place of m/s^2".format(imu.topic, size),
                                "in the driver: m/s^2; localizers do not use it"))
     _, oriented = imu_yaw_rate(imu)
     along = force / size
@@ -53,14 +54,16 @@ def gravity(evidence, imu):
     if along[2] < -VERTICAL_SHARE:
         what = "z points down: NED axes or upside down"
     else:
-        what = "the z axis is not vertical: gravity is along {}{}".format("-" if along["xyz".index(axis)] < 0 else "+", axis)
-    mounted = evidence.recording.transforms.static_pose(evidence.setup.base_link_frame, frame)
+        sign = "-" if along["xyz".index(axis)] < 0 else "+"
+        what = "the z axis is not vertical: gravity is along {}{}".format(sign, axis)
+    mounted = evidence.imu_mounting()
     if turned and mounted and not is_level(mounted):
         return findings + [passed("imu.axes", "{}: {}; tf from {} says so".format(
             imu.topic, what, evidence.setup.base_link_frame), **values)]
     return findings + [failed("imu.axes", "{}: {}, and neither its orientation nor tf says so".format(imu.topic, what),
                               "in the driver: axes of REP-103 (x forward, y left, z up)",
-                              "or tf {} -> {} as it is mounted".format(evidence.setup.base_link_frame, frame or "imu_link"),
+                              "or tf {} -> {} as it is mounted".format(
+                                  evidence.setup.base_link_frame, frame or "imu_link"),
                               "localization.launch use_imu:=false  # until then", **values)]
 
 

@@ -55,7 +55,8 @@ class LiveReader:
             topics = [Topic(name, self._types[name], self._counts[name] if self._listened(name) else 1)
                       for name in sorted(self._types)]
             now = self._now()
-            recording = self._collector.recording("live, " + rosgraph.get_master_uri(), topics, now - seconds, now, True)
+            recording = self._collector.recording("live, " + rosgraph.get_master_uri(), topics, now - seconds, now,
+                                                  True)
         recording.choices = self.choices
         recording.trouble = self._trouble
         return recording

@@ -66,7 +66,8 @@ def satellites(message, received):
 
 def dilution(all_of):
     """Squared dilution of precision, east and north, of the satellites in the fix as far as that is known; else NaN."""
-    known = [each for each in all_of if math.isfinite(each.azimuth) and math.isfinite(each.elevation) and each.cn0 > 0.0]
+    known = [each for each in all_of if math.isfinite(each.azimuth) and math.isfinite(each.elevation)
+             and each.cn0 > 0.0]
     for chosen in ([each for each in known if math.isfinite(each.pseudorange_residual)],
                    [each for each in known if each.used == 1], known):
         if len(chosen) >= LEAST_RANGES:
@@ -75,7 +76,8 @@ def dilution(all_of):
         return UNKNOWN_DILUTION
     azimuth, elevation = (np.array([getattr(each, name) for each in chosen]) for name in ("azimuth", "elevation"))
     level = np.cos(elevation)
-    design = np.column_stack([level * np.sin(azimuth), level * np.cos(azimuth), np.sin(elevation), np.ones(len(chosen))])
+    design = np.column_stack([level * np.sin(azimuth), level * np.cos(azimuth), np.sin(elevation),
+                              np.ones(len(chosen))])
     normal = design.T @ design
     if np.linalg.cond(normal) > MOST_CONDITION:
         return UNKNOWN_DILUTION

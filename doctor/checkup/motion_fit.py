@@ -1,7 +1,7 @@
 """Which reading of odometry and IMU explains the receiver best, and how well: units, signs, axes, frames, scale.
 
-Each reading (yaw rate in degrees, reversed, ...) is integrated to a track, and the track is laid over the fixes, turned,
-shifted and scaled freely in each window. The reading that leaves least is what the sensors mean.
+Each reading (yaw rate in degrees, reversed, ...) is integrated to a track, and the track is laid over the fixes,
+turned, shifted and scaled freely in each window. The reading that leaves least is what the sensors mean.
 """
 
 from collections import namedtuple
@@ -12,8 +12,9 @@ from . import fits, signals
 
 DEGREE = np.pi / 180.0
 IN_ODOM_FRAME = "twist in the odometry's frame"
-# Another reading is right only where it explains more by this (mean of the logarithm of what is left), surely (mean over
-# its standard error), in most windows. On good recordings a wrong reading has gains of -0.1 to -4; see docs/doctor.md.
+# Another reading is right only where it explains more by this (mean of the logarithm of what is left), surely (mean
+# over its standard error), in most windows. On good recordings a wrong reading has gains of -0.1 to -4; see
+# docs/doctor.md.
 LEAST_GAIN = 0.3
 LEAST_SURENESS = 2.5
 LEAST_SHARE = 0.7

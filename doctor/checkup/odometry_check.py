@@ -39,7 +39,8 @@ def not_finite(odometry):
     if not bad:
         return []
     return [(failed if bad > 0.01 * len(odometry) else warned)(
-        "odometry.finite", "{}: the twist of {} of {} messages is not finite".format(odometry.topic, bad, len(odometry)),
+        "odometry.finite",
+        "{}: the twist of {} of {} messages is not finite".format(odometry.topic, bad, len(odometry)),
         "in the driver: no NaN; leave a message out rather", count=bad)]
 
 
@@ -97,7 +98,7 @@ def pose_and_twist(odometry, steps):
         return [warned(name, "{}: the pose stays where it is, though the twist moves: twist only; tf is then of no "
                        "use".format(topic), "in the driver: integrate the pose, and broadcast odom -> base_link")]
     findings = []
-    both = moves & pose_moves & (np.abs(steps.pose_rate) * STEP_S < SPINS_RAD) & (np.abs(steps.rate) * STEP_S < SPINS_RAD)
+    both = moves & pose_moves & (np.maximum(np.abs(steps.pose_rate), np.abs(steps.rate)) * STEP_S < SPINS_RAD)
     if np.sum(both) >= LEAST_SAMPLES:
         findings += speeds(name, topic, steps, both)
     turning = turns & pose_turns if np.sum(turns & pose_turns) >= LEAST_SAMPLES else None
@@ -138,7 +139,8 @@ def speeds(name, topic, steps, both):
                                "in the driver: turn the twist by minus the pose's yaw, so that linear.x is forward",
                                **values))
     elif np.real(body) < 0.7:
-        findings.append(warned(name, "{}: the pose does not move where heading and twist point (mean cosine {:.2f})".format(
+        findings.append(warned(name,
+                               "{}: the pose does not move where heading and twist point (mean cosine {:.2f})".format(
             topic, np.real(body)), "in the driver: twist in the robot's frame, x forward; yaw of the pose", **values))
     return findings
 
@@ -171,7 +173,8 @@ def direction(evidence, odometry):
     values = dict(reverse_share=share)
     straight = np.sum(np.abs(forward)) > 0.5 * way
     if share > REVERSE_SHARE and straight:
-        return [failed("odometry.direction", "{}: {:.0f} % of the way is backwards: the speed's sign is reversed".format(
+        return [failed("odometry.direction",
+                       "{}: {:.0f} % of the way is backwards: the speed's sign is reversed".format(
             odometry.topic, 100.0 * share), "in the driver: twist.linear.x positive forward", **values)]
     return [passed("odometry.direction", "{}: {:.0f} m forward, {:.0f} m backwards".format(
         odometry.topic, np.sum(forward[forward > 0.0]), -np.sum(forward[forward < 0.0])), **values)]
@@ -183,8 +186,9 @@ def sideways(evidence, odometry):
     share = float(np.mean(np.abs(velocity.imag) > SIDEWAYS_MPS))
     if share < SIDEWAYS_SHARE:
         return []
-    return [warned("odometry.sideways", "{}: linear.y is more than {} m/s in {:.0f} % of the messages: a holonomic base, "
-                   "or a twist that is not in the robot's frame".format(odometry.topic, SIDEWAYS_MPS, 100.0 * share),
+    return [warned("odometry.sideways", "{}: linear.y is more than {} m/s in {:.0f} % of the messages: a holonomic "
+                   "base, or a twist that is not in the robot's frame".format(odometry.topic, SIDEWAYS_MPS,
+                                                                              100.0 * share),
                    "localization.launch robot:=holonomic", "or in the driver: twist in child_frame_id", share=share)]
 
 

@@ -18,7 +18,8 @@ body { font-family: sans-serif; color: #222; max-width: 70em; margin: 2em auto; 
 h1 { font-size: 1.5em; } h2 { font-size: 1.2em; margin-top: 1.8em; border-bottom: 1px solid #ccc; }
 table { border-collapse: collapse; width: 100%; font-size: 0.92em; }
 td { padding: 0.3em 0.6em; border-bottom: 1px solid #e4e4e4; vertical-align: top; }
-td.level { font-weight: bold; width: 3.5em; } code { display: block; color: #333; background: #f5f5f5; padding: 0.1em 0.4em; }
+td.level { font-weight: bold; width: 3.5em; }
+code { display: block; color: #333; background: #f5f5f5; padding: 0.1em 0.4em; }
 .PASS { color: #1a7f37; } .WARN { color: #9a6700; } .FAIL { color: #c1121f; }
 img { max-width: 100%; }
 """

@@ -30,8 +30,8 @@ def strength(satellites):
     text = "{}: {:.0f} % of the time at least {} satellites above 35 dB-Hz (median {:.0f})".format(
         satellites.topic, 100.0 * share, ENOUGH_STRONG, values["median_strong"])
     if share < GOOD_SHARE:
-        return [warned("satellites.cn0", text + ": weak", "the antenna on a metal plate with a view of the sky, away from "
-                       "computers and USB 3; or the streets are as narrow as that", **values)]
+        return [warned("satellites.cn0", text + ": weak", "the antenna on a metal plate with a view of the sky, away "
+                       "from computers and USB 3; or the streets are as narrow as that", **values)]
     return [passed("satellites.cn0", text, **values)]
 
 
@@ -43,8 +43,8 @@ def contents(evidence, satellites):
                                "GSV of NMEA or NAV-SAT of u-blox switched on; occlusion_node needs them"))
     share = float(np.mean(satellites.residuals >= 5))
     if share < 0.5:
-        findings.append(warned("satellites.residuals", "{}: residuals of at least 5 satellites in {:.0f} % of the messages: "
-                               "reflected signals cannot be left out".format(satellites.topic, 100.0 * share),
+        findings.append(warned("satellites.residuals", "{}: residuals of at least 5 satellites in {:.0f} % of the "
+                               "messages: reflected signals cannot be left out".format(satellites.topic, 100.0 * share),
                                "NAV-SAT of u-blox (rate 1), or GRS of NMEA switched on", share=share))
     else:
         findings.append(passed("satellites.residuals", "{}: residuals of {:.0f} satellites in the median".format(

@@ -9,9 +9,9 @@ AS_GOOD, NEARLY_AS_GOOD = 0.97, 0.9  # of the greatest correlation
 NEAR_S = 5.0           # the flank of a peak
 SCALE_OF_MAD = 1.4826  # median absolute deviation to the standard deviation of a normal distribution
 
-# `lag` s: by how much the stamps of the second series are ahead of the first's (positive: its events have later stamps);
-# `correlation` at this lag, of the sign of the strongest; `at_zero` the correlation without a lag; `support` samples.
-# `unique`: whether no other lag is nearly as good.
+# `lag` s: by how much the stamps of the second series are ahead of the first's (positive: its events have later
+# stamps); `correlation` at this lag, of the sign of the strongest; `at_zero` the correlation without a lag; `support`
+# samples. `unique`: whether no other lag is nearly as good.
 Lag = namedtuple("Lag", "lag correlation at_zero support unique")
 
 
@@ -63,7 +63,8 @@ def resample(t, values, grid, step):
     # The integral, interpolated: its differences are the means, however the samples lie.
     integral = np.concatenate([[0.0], np.cumsum(0.5 * (values[1:] + values[:-1]) * np.diff(t))])
     low, high = np.interp(grid - 0.5 * step, t, integral), np.interp(grid + 0.5 * step, t, integral)
-    valid = gaps_mask(t, grid, max(3.0 * period(t), 1.5 * step)) & (grid - 0.5 * step >= t[0]) & (grid + 0.5 * step <= t[-1])
+    inside = (grid - 0.5 * step >= t[0]) & (grid + 0.5 * step <= t[-1])
+    valid = inside & gaps_mask(t, grid, max(3.0 * period(t), 1.5 * step))
     return (high - low) / step, valid
 
 

@@ -37,7 +37,8 @@ def faults_of(stream):
                        "in the driver: message.header.stamp = the time of the measurement", zero=zero)]
     findings = []
     if zero:
-        findings.append(warned(name, "{}: {} of {} stamps are zero; such messages are left out".format(topic, zero, count),
+        findings.append(warned(name,
+                               "{}: {} of {} stamps are zero; such messages are left out".format(topic, zero, count),
                                "in the driver: message.header.stamp = the time of the measurement", zero=zero))
     t = stream.t[finite & (stream.t >= ZERO_S)]
     if len(t) < 2:
@@ -57,7 +58,8 @@ def disorder(name, topic, steps, count):
     same, back = int(np.sum(steps == 0.0)), int(np.sum(steps < 0.0))
     jumps = steps[steps < -BACK_JUMP_S]
     if same > FEW * count:
-        findings.append(warned(name, "{}: {} of {} stamps are those of the message before: the second is left out".format(
+        findings.append(warned(name,
+                               "{}: {} of {} stamps are those of the message before: the second is left out".format(
             topic, same, count), "one publisher on the topic, and a stamp for each measurement", repeated=same))
     if len(jumps) > max(3, FEW * count):
         findings.append(failed(name, "{}: stamps jump back {} times, by up to {:.1f} s".format(

@@ -63,7 +63,8 @@ def as_json(recording, findings, exit_code):
         "duration_s": max(recording.end - recording.begin, 0.0),
         "topics": [dict(name=each.name, type=each.type, count=each.count) for each in recording.topics],
         "chosen": {kind: dict(topic=topic, how=how) for kind, (topic, how) in recording.choices.items()},
-        "findings": [dict(check=each.check, level=each.level, text=each.text, change=list(each.change), values=each.values)
+        "findings": [dict(check=each.check, level=each.level, text=each.text, change=list(each.change),
+                          values=each.values)
                      for each in findings],
         "summary": count(findings),
         "exit_code": exit_code}), indent=2, ensure_ascii=False, sort_keys=False) + "\n"

@@ -80,8 +80,9 @@ def missing(recording, kind, topic):
         preset = preset_of(recording) if kind == "fix" else None
         # A bag may hold only a part of what the robot has; a live graph without it does not work.
         finding = failed if recording.is_live or not recording.streams() else warned
-        return finding(name, "no {}: {}; without it nothing is localized".format(NAMES[kind], what) if kind == "fix" else
-                       "no odometry: {}; a localizer needs it, or replay --odom none".format(what),
+        text = ("no fixes: {}; without them nothing is localized" if kind == "fix" else
+                "no odometry: {}; a localizer needs it, or replay --odom none").format(what)
+        return finding(name, text,
                        "localization.launch receiver:={}".format(preset) if preset else available(recording))
     if kind == "imu" or preset_of(recording) is None:
         return warned(name, "{}: {}; with it {}".format(NAMES[kind], what, BETTER_WITH[kind]),

@@ -65,20 +65,22 @@ def directions(evidence):
     vt, velocity = vt[keep], velocity[keep]
     t, q, _ = evidence.fixes
     track = integrated(vt, velocity)
-    parts = [part for part in motion_fit.useful_windows(track, t, q, vt) if motion_fit.extent(q[part]) > 0.25 * LEAST_WAY_M]
+    parts = [part for part in motion_fit.useful_windows(track, t, q, vt)
+             if motion_fit.extent(q[part]) > 0.25 * LEAST_WAY_M]
     if len(parts) < LEAST_WINDOWS:
         return [passed(name, "{}: too little driving to compare it with the fixes".format(topic))]
     place = track.place_at(t)
     plain = motion_fit.read_unturned("as it is", place, t, q, parts)
     free = motion_fit.read("turned", "", track, t, q, parts)
     wrong = [motion_fit.read_unturned(what, factor * (np.conj(place) if what == NED else place), t, q, parts)
-             for what, factor in ((NED, 1j), ("reversed", -1.0), ("turned by 90 degrees", 1j), ("turned by -90 degrees", -1j))]
+             for what, factor in ((NED, 1j), ("reversed", -1.0), ("turned by 90 degrees", 1j),
+                                  ("turned by -90 degrees", -1j))]
     other = motion_fit.best_of(wrong)
     body = body_reading(evidence, vt, velocity, t, q, parts)
     values = dict(left=signals.median(plain.left))
     if body is not None and better(body, plain) and not better(other, body):
-        return [failed(name, "{}: it is in the robot's own frame (x forward), not east and north: {:.0f} % of it is to the "
-                       "side, and the fixes go elsewhere".format(topic, 100.0 * side_share(velocity)),
+        return [failed(name, "{}: it is in the robot's own frame (x forward), not east and north: {:.0f} % of it is to "
+                       "the side, and the fixes go elsewhere".format(topic, 100.0 * side_share(velocity)),
                        "localization.launch velocity_topic:= of a velocity in east and north (ENU)",
                        side_share=side_share(velocity), **values)]
     if better(other, plain):
@@ -89,7 +91,8 @@ def directions(evidence):
     if values["left"] > GOOD_LEFT:
         return [passed(name, "{}: the fixes are too rough to compare it with".format(topic), **values)]
     evidence.velocity_is_good = True
-    return [passed(name, "{}: east and north, as the fixes move".format(topic), **values)] + units(evidence, topic, plain)
+    east_north = passed(name, "{}: east and north, as the fixes move".format(topic), **values)
+    return [east_north] + units(evidence, topic, plain)
 
 
 def better(one, other):

@@ -151,16 +151,16 @@ def dead(evidence):
             "slipping wheels".format(topic, total, standing[0][0] - evidence.recording.begin)
         enough = max(FAIL_S, FAIL_SHARE * moving) * (1.0 if evidence.velocities is not None else 2.0)
         finding = failed if total > enough else warned
-        return [finding("odometry.wheels", text, "encoder and cable; {} takes the receiver's speed meanwhile, where it has "
-                        "one (velocity_topic:=)".format(evidence.setup.section), standing_s=total)]
+        return [finding("odometry.wheels", text, "encoder and cable; {} takes the receiver's speed meanwhile, where it "
+                        "has one (velocity_topic:=)".format(evidence.setup.section), standing_s=total)]
     if evidence.velocities is None:
         return [passed("odometry.wheels", "{}: the wheels turn where the fixes move".format(topic))]
     spinning = runs(t, (np.interp(t, odometry_t, np.abs(own)) > 2.0 * MOVING_MPS)
                     & (speed_of < DEAD_SHARE * np.interp(t, odometry_t, np.abs(own))), DEAD_S)
     total = sum(end - begin for begin, end in spinning)
     if total > max(WARN_S, WARN_SHARE * moving):
-        return [warned("odometry.wheels", "{}: the wheels turn for {:.0f} s while the receiver stands (from {:.0f} s on): "
-                       "slipping wheels, or a receiver that holds its place".format(
+        return [warned("odometry.wheels", "{}: the wheels turn for {:.0f} s while the receiver stands (from {:.0f} s "
+                       "on): slipping wheels, or a receiver that holds its place".format(
                            topic, total, spinning[0][0] - evidence.recording.begin),
                        "the receiver's static hold off; else wheels with more grip", spinning_s=total)]
     return [passed("odometry.wheels", "{}: the wheels turn where the receiver moves".format(topic))]
@@ -186,8 +186,8 @@ def unsigned(evidence):
     total = sum(end - begin for begin, end in stretches)
     if total <= 0.0:
         return []
-    return [warned("odometry.unsigned", "{}: for {:.1f} s (from {:.0f} s on) the receiver moves against the heading: a speed "
-                   "without sign while reversing, or reflections".format(
+    return [warned("odometry.unsigned", "{}: for {:.1f} s (from {:.0f} s on) the receiver moves against the heading: a "
+                   "speed without sign while reversing, or reflections".format(
                        evidence.recording.odometry.topic, total, stretches[0][0] - evidence.recording.begin),
                    "in the driver: twist.linear.x negative when reversing", backwards_s=total)]
 

@@ -15,6 +15,8 @@ SAME_WITHIN = 0.3         # of the factor between them: wheels that slip in turn
 BIAS_RAD_S = 0.01         # 0.6 deg/s: learnt by the filter, but slowly
 GREAT_RATE_RAD_S = 8.0    # faster than any robot turns for long: degrees
 SMALL_RAD_S = 1e-9
+# What makes good of a reading.
+FACTORS = {"in degrees": motion_fit.DEGREE, "reversed": -1.0, "reversed and in degrees": -motion_fit.DEGREE}
 SIDEWAYS_MPS, SIDEWAYS_SHARE = 0.1, 0.05
 
 
@@ -26,14 +28,16 @@ def check(evidence):
         return once(pair(evidence, {}) + impossible(evidence, "odometry") + impossible(evidence, "imu"))
     if moves_in_odom_frame(evidence, readings):
         # Then the ways say nothing of the yaw rates.
-        return [failed("odometry.frame", "{}: fixes move as if the twist were in the odometry's frame (header.frame_id), not "
-                       "in the robot's".format(evidence.recording.odometry.topic),
+        return [failed("odometry.frame", "{}: fixes move as if the twist were in the odometry's frame "
+                       "(header.frame_id), not in the robot's".format(evidence.recording.odometry.topic),
                        "in the driver: twist in child_frame_id, x forward")] + pair(evidence, {})
     by_receiver = {source: best_reading(readings, source) for source in ("odometry", "imu")}
     findings = pair(evidence, by_receiver)
     for source in ("odometry", "imu"):
         findings += against_receiver(evidence, source, by_receiver[source])
         findings += impossible(evidence, source)
+        if by_receiver[source] and by_receiver[source][0] in FACTORS:
+            evidence.correct_yaw_rate(source, FACTORS[by_receiver[source][0]])  # so that the other checks see past it
     findings += bias(evidence)
     return once(findings)
 
@@ -145,9 +149,10 @@ def judge(evidence, slope, values, by_receiver):
         return [failed("odometry.yaw_rate", text + ": the odometry's yaw rate has the reversed sign",
                        "in the driver: twist.angular.z positive to the left", **values)]
     if reversed_sign:
-        return [failed("imu.yaw_rate", text + ": the IMU has NED axes or is upside down, or the odometry's yaw rate has "
-                       "the reversed sign" + gravity_hint(evidence), *imu_change("reversed"), **values)]
-    return [failed("imu.yaw_rate" if guilty != "odometry" else "odometry.yaw_rate", text + (": " + unit if unit else ""),
+        return [failed("imu.yaw_rate", text + ": the IMU has NED axes or is upside down, or the odometry's yaw rate "
+                       "has the reversed sign" + gravity_hint(evidence), *imu_change("reversed"), **values)]
+    return [failed("imu.yaw_rate" if guilty != "odometry" else "odometry.yaw_rate", text
+                   + (": " + unit if unit else ""),
                    "in the drivers: angular_velocity.z and twist.angular.z in rad/s", **values)]
 
 
@@ -249,8 +254,8 @@ def impossible(evidence, source):
     stream = evidence.recording.odometry if source == "odometry" else evidence.recording.imu
     great = float(np.mean(rate > GREAT_RATE_RAD_S))
     if great > 0.02:
-        return [failed(source + ".yaw_rate", "{}: the yaw rate is above {:.0f} rad/s in {:.0f} % of the messages: degrees "
-                       "per second?".format(stream.topic, GREAT_RATE_RAD_S, 100.0 * great),
+        return [failed(source + ".yaw_rate", "{}: the yaw rate is above {:.0f} rad/s in {:.0f} % of the messages: "
+                       "degrees per second?".format(stream.topic, GREAT_RATE_RAD_S, 100.0 * great),
                        *(imu_change("degrees") if source == "imu" else ("in the driver: twist.angular.z in rad/s",)),
                        share=great)]
     single = int(np.sum(rate > GREAT_RATE_RAD_S))

@@ -106,7 +106,8 @@ def write_bag(path, recording):
     for k in range(len(recording.odometry)):
         one, message = recording.odometry, Odometry(child_frame_id="base_link")
         message.pose.pose.position.x, message.pose.pose.position.y = one.x[k], one.y[k]
-        message.pose.pose.orientation.z, message.pose.pose.orientation.w = math.sin(one.yaw[k] / 2), math.cos(one.yaw[k] / 2)
+        q = message.pose.pose.orientation
+        q.z, q.w = math.sin(0.5 * one.yaw[k]), math.cos(0.5 * one.yaw[k])
         message.twist.twist.linear.x, message.twist.twist.angular.z = one.vx[k], one.wz[k]
         add("odometry", one, k, message)
     for k in range(len(recording.imu)):

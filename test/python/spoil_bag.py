@@ -3,8 +3,8 @@
 
 usage: spoil_bag.py FAULT IN.bag OUT.bag [--pose]
 
-With --pose the odometry's pose is integrated anew from the spoilt twist, as by a driver that has the fault in its wheels.
-`spoil_bag.py --list` names the faults. Topics are taken by their types, as `doctor` takes them.
+With --pose the odometry's pose is integrated anew from the spoilt twist, as by a driver that has the fault in its
+wheels. `spoil_bag.py --list` names the faults. Topics are taken by their types, as `doctor` takes them.
 
 `spoil_bag.py --table IN.bag` spoils a bag with each of them, runs doctor on it, and prints a table of what it said.
 """
@@ -290,7 +290,8 @@ def print_table(source):
                 level, check, _ = judge(fault, source, folder)
             except ValueError:
                 continue
-            print("| `{}` | {} | {} |".format(fault, level or "–", "`{}`".format(check) if check else "–"), flush=True)
+            check = "`{}`".format(check) if check else "–"
+            print("| `{}` | {} | {} |".format(fault, level or "–", check), flush=True)
 
 
 def main():
@@ -302,7 +303,8 @@ def main():
         print_table(sys.argv[2])
         return
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("fault", help="a name of --list, with {} also its times of receipt are changed".format(BOTH_TIMES))
+    parser.add_argument("fault",
+                        help="a name of --list, with {} also its times of receipt are changed".format(BOTH_TIMES))
     parser.add_argument("source")
     parser.add_argument("target")
     parser.add_argument("--pose", action="store_true", help="integrate the pose from the spoilt twist")

@@ -47,7 +47,8 @@ class ProgramTest(unittest.TestCase):
     def test_what_cannot_be_read(self):
         with open(self.bag, "rb") as whole:
             content = whole.read()
-        for name, data, words in (("cut.bag", content[:len(content) // 2], "rosbag reindex"), ("text.bag", b"text", "no bag"),
+        for name, data, words in (("cut.bag", content[:len(content) // 2], "rosbag reindex"),
+                                  ("text.bag", b"text", "no bag"),
                                   ("empty.bag", b"", "empty"), ("missing.bag", None, "No such file")):
             if data is not None:
                 with open(os.path.join(self.folder.name, name), "wb") as target:
