@@ -8,6 +8,7 @@ from .finding import PASS, failed, passed, warned
 
 AHEAD_S = 0.3          # a message cannot arrive before it was measured; clocks that are set by NTP differ by less
 FAIL_AHEAD_S = 0.9
+DRIFT_S = 0.3          # a delay that grows by more is no latency
 LATE_S = 0.5           # later than this after its stamp is more than a receiver needs
 ANOTHER_EPOCH_S = 86400.0
 FAR_S = 3.0            # the most that a localizer allows for by itself is 2 s
@@ -65,6 +66,8 @@ def arrivals(evidence):
     findings = []
     if all(abs(delay) < 1e-6 for _, delay in delays.values()):
         return [passed("clocks.arrival", "the bag's times are the stamps themselves: nothing to compare")]
+    for stream, _ in delays.values():
+        findings += runaway(stream)
     for kind, (stream, delay) in delays.items():
         name, offset = "clocks." + kind, delay - base
         change = ("synchronize the clocks: chrony or ntp on both computers, and the receiver's stamps in UTC",)
@@ -90,6 +93,21 @@ def arrivals(evidence):
     return findings or [passed("clocks.arrival",
                                "stamps and times of arrival agree between the streams, to {:.2f} s".format(
         max(abs(delay - base) for _, delay in delays.values())))]
+
+
+def runaway(stream):
+    """A clock that runs faster or slower than that of the computer which recorded."""
+    delay = (stream.received - stream.t)[stream.t > 0.0]
+    tenth = len(delay) // 10
+    if tenth < 5:
+        return []
+    drift = signals.median(delay[-tenth:]) - signals.median(delay[:tenth])
+    if not DRIFT_S < abs(drift) < ANOTHER_EPOCH_S:
+        return []
+    return [warned("clocks.drift", "{}: the delay between stamps and arrival changes by {:+.2f} s from the first to "
+                                   "the last "
+                   "tenth: its clock runs away, or was set meanwhile".format(stream.topic, drift),
+                   "synchronize the clocks: chrony or ntp, and not by a jump while it drives", drift_s=drift)]
 
 
 def imu_lag(evidence):

@@ -131,6 +131,7 @@ FAULTS = (
     ("IMU's clock, by the motion", set_columns("imu", t=lambda o: o.t - 1.0, received=lambda o: o.received - 1.0),
      "FAIL",
      "behind"),
+    ("a clock that runs away", set_columns("imu", t=lambda o: T0 + 1.02 * (o.t - T0)), "WARN", "runs away"),
     ("IMU since its start", set_columns("imu", t=lambda o: o.t - T0 + 50.0), "FAIL", "another time"),
     ("IMU in degrees", set_columns("imu", wz=lambda o: o.wz * DEGREES), "FAIL", "degrees per second"),
     ("IMU NED", set_columns("imu", wz=lambda o: -o.wz, az=lambda o: -o.az), "FAIL", "NED"),
