@@ -122,11 +122,12 @@ class Evidence:
         return tracks
 
     def shift(self, kind, lag):
-        """Takes a clock's offset out of fixes or velocities (s, positive: stamps ahead)."""
-        if kind == "fix":
-            self.fixes = (self.fixes[0] - lag,) + self.fixes[1:]
-        else:
-            self.velocities = (self.velocities[0] - lag,) + self.velocities[1:]
+        """Takes a clock's offset out of fixes, velocities or IMU, where they are (s, positive: stamps ahead)."""
+        name = {"fix": "fixes", "velocity": "velocities", "imu": "imu_rate"}[kind]
+        series = getattr(self, name)
+        if series is not None:
+            setattr(self, name, (series[0] - lag,) + series[1:])
+            self.tracks = self._tracks() if kind == "imu" else self.tracks
 
     def replace_places(self, places):
         """Other places for the fixes, where the recorded ones are wrong in a way that is known."""
