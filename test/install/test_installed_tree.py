@@ -38,6 +38,7 @@ class InstalledTreeTest(unittest.TestCase):
         self.run_installed(rosrun + "replay drive.bag --output out.bag --json out.json")
         with open(os.path.join(self.directory, "out.json")) as file:
             self.assertLess(json.load(file)["errors"]["position_m"]["median"], 5.0)
+        self.assertIn("summary: 0 FAIL", self.run_installed(rosrun + "doctor drive.bag --html doctor.html"))
         self.run_installed(rosrun + "evaluate out.bag --truth drive.bag --output results")
         self.assertTrue(glob.glob(os.path.join(self.directory, "results", "*.png")), "the reports' scripts are installed")
 

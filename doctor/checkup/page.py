@@ -1,0 +1,163 @@
+"""The report as one HTML file, with its plots inside."""
+
+import base64
+import html
+import io
+
+import numpy as np
+
+from . import fits, signals
+from .finding import family
+from .text import FAMILIES, ordered_families, summary
+
+DPI = 100
+MOST_POINTS = 4000     # of a line
+ODOMETRY, IMU, RECEIVER, FIX = "#0072b2", "#7b4fd6", "#d55e00", "#b08d57"
+STYLE = """
+body { font-family: sans-serif; color: #222; max-width: 70em; margin: 2em auto; padding: 0 1em; }
+h1 { font-size: 1.5em; } h2 { font-size: 1.2em; margin-top: 1.8em; border-bottom: 1px solid #ccc; }
+table { border-collapse: collapse; width: 100%; font-size: 0.92em; }
+td { padding: 0.3em 0.6em; border-bottom: 1px solid #e4e4e4; vertical-align: top; }
+td.level { font-weight: bold; width: 3.5em; }
+code { display: block; color: #333; background: #f5f5f5; padding: 0.1em 0.4em; }
+.PASS { color: #1a7f37; } .WARN { color: #9a6700; } .FAIL { color: #c1121f; }
+img { max-width: 100%; }
+"""
+
+
+def thin(*columns):
+    """At most MOST_POINTS of each."""
+    step = max(1, len(columns[0]) // MOST_POINTS)
+    return [column[::step] for column in columns]
+
+
+def embedded(figure, plt):
+    """An image tag with the picture in it."""
+    stream = io.BytesIO()
+    figure.savefig(stream, dpi=DPI, format="png", bbox_inches="tight", facecolor="white")
+    plt.close(figure)
+    return '<img alt="plot" src="data:image/png;base64,{}">'.format(base64.b64encode(stream.getvalue()).decode())
+
+
+def plot_tracks(axes, evidence):
+    """Fixes, and the odometry's track laid over them."""
+    if evidence.fixes is not None:
+        t, q, _ = evidence.fixes
+        axes.plot(*thin(q.real, q.imag), ".", color=FIX, markersize=2.5, label="fixes")
+        track = evidence.track()
+        if track is not None and len(t) >= fits.LEAST_POINTS:
+            inside = (t >= track.t[0]) & (t <= track.t[-1])
+            if np.sum(inside) >= fits.LEAST_POINTS:
+                p = track.place_at(t[inside])
+                fitted = fits.fit(p, q[inside])
+                laid = np.exp(1j * fitted.rotation) * p
+                laid = laid + signals.median((q[inside] - laid).real) + 1j * signals.median((q[inside] - laid).imag)
+                axes.plot(*thin(laid.real, laid.imag), color=ODOMETRY, linewidth=1.0,
+                          label="odometry, laid over the fixes")
+        low, high = np.percentile(q.real, [1, 99]), np.percentile(q.imag, [1, 99])
+        margin = 0.2 * max(np.ptp(low), np.ptp(high), 5.0)
+        axes.set_xlim(low[0] - margin, low[1] + margin)
+        axes.set_ylim(high[0] - margin, high[1] + margin)
+    elif evidence.track() is not None:
+        track = evidence.track()
+        axes.plot(*thin(track.place.real, track.place.imag), color=ODOMETRY, linewidth=1.0, label="odometry")
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.set_xlabel("east [m]")
+    axes.set_ylabel("north [m]")
+
+
+def plot_speeds(axes, evidence, origin):
+    """Speeds of odometry and receiver."""
+    if evidence.velocities is not None:
+        t, velocity = evidence.velocities
+        axes.plot(*thin(t - origin, np.abs(velocity)), ".", color=RECEIVER, markersize=2.0, label="receiver's velocity")
+    if evidence.motion is not None:
+        t, velocity, _ = evidence.motion
+        axes.plot(*thin(t - origin, velocity.real), color=ODOMETRY, linewidth=0.8, label="odometry, linear.x")
+        top = 1.5 * np.percentile(np.abs(velocity), 99.5) + 0.5
+        axes.set_ylim(min(0.0, 1.3 * np.min(velocity.real)) - 0.1, max(top, 1.0))
+    axes.set_ylabel("speed [m/s]")
+
+
+def plot_rates(axes, evidence, origin):
+    """Yaw rates of odometry and IMU."""
+    if evidence.imu_rate is not None:
+        t, rate = evidence.imu_rate
+        axes.plot(*thin(t - origin, rate), color=IMU, linewidth=0.6, label="IMU")
+    if evidence.motion is not None:
+        t, _, rate = evidence.motion
+        axes.plot(*thin(t - origin, rate), color=ODOMETRY, linewidth=0.6, label="odometry")
+    axes.set_ylabel("yaw rate [rad/s]")
+
+
+def plot_message_rates(axes, recording, origin):
+    """Messages a second of each stream."""
+    for stream in recording.streams():
+        t = stream.received if stream.received.any() else stream.t
+        edges = np.arange(recording.begin, max(recording.end, recording.begin + 5.0) + 5.0, 5.0)
+        counts, _ = np.histogram(t, edges)
+        axes.step(edges[:-1] - origin, counts / 5.0, where="post", linewidth=0.9, label=stream.topic)
+    axes.set_yscale("symlog", linthresh=1.0)
+    axes.set_ylabel("messages [1/s]")
+    axes.set_xlabel("time [s]")
+
+
+def plots(evidence):
+    """The figures as image tags."""
+    import matplotlib
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    recording = evidence.recording
+    parts = []
+    figure, axes = plt.subplots(figsize=(8.0, 6.5))
+    plot_tracks(axes, evidence)
+    finish(axes)
+    parts.append(("Tracks", embedded(figure, plt)))
+    figure, all_axes = plt.subplots(3, 1, figsize=(10.0, 8.5), sharex=True)
+    plot_speeds(all_axes[0], evidence, recording.begin)
+    plot_rates(all_axes[1], evidence, recording.begin)
+    plot_message_rates(all_axes[2], recording, recording.begin)
+    for axes in all_axes:
+        finish(axes)
+    parts.append(("Speeds, yaw rates, messages", embedded(figure, plt)))
+    return parts
+
+
+def finish(axes):
+    """Grid and legend."""
+    axes.grid(True, color="#dddddd", linewidth=0.6)
+    axes.set_axisbelow(True)
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend(fontsize=8, loc="upper right")
+
+
+def table(findings):
+    """A family's findings."""
+    rows = []
+    for finding in findings:
+        changes = "".join("<code>{}</code>".format(html.escape(change)) for change in finding.change)
+        rows.append('<tr><td class="level {0}">{0}</td><td>{1}: {2}{3}</td></tr>'.format(
+            finding.level, html.escape(finding.check), html.escape(finding.text), changes))
+    return "<table>{}</table>".format("\n".join(rows))
+
+
+def page(evidence, findings):
+    """The whole page as text."""
+    recording = evidence.recording
+    title = html.escape("doctor: " + recording.name)
+    parts = ["<!DOCTYPE html>", '<html lang="en"><head><meta charset="utf-8">',
+             "<title>{}</title><style>{}</style></head><body>".format(title, STYLE), "<h1>{}</h1>".format(title),
+             "<p>{:.0f} s. {}</p>".format(max(recording.end - recording.begin, 0.0), html.escape(summary(findings)))]
+    bad = [finding for level in ("FAIL", "WARN") for finding in findings if finding.level == level]
+    if bad:
+        parts += ["<h2>What to change</h2>", table(bad)]
+    for heading, image in plots(evidence):
+        parts += ["<h2>{}</h2>".format(heading), image]
+    for name in ordered_families(findings):
+        parts += ["<h2>{}</h2>".format(html.escape(FAMILIES.get(name, name))),
+                  table([finding for finding in findings if family(finding) == name])]
+    parts.append("<h2>Topics</h2><table>{}</table>".format("\n".join(
+        "<tr><td>{}</td><td>{}</td><td>{}</td></tr>".format(html.escape(each.name), html.escape(each.type), each.count)
+        for each in recording.topics)))
+    return "\n".join(parts + ["</body></html>", ""])
