@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from . import fits, signals
+from . import fits, motion_fit, signals
 from .evidence import LEAST_WAY_M
 from .finding import PASS, failed, passed, warned
 
@@ -157,6 +157,8 @@ def receiver_lag(evidence, kind, track, source=None):
         return [passed(name, "{} and {} agree in time, to {:.1f} s by the motion".format(
             stream.topic, reference, abs(lag)),
                        **values)]
+    if kind == "fix" and abs(lag) > FAR_S and mirror_fits_better(track, t, q, lag):
+        return []  # turns to and fro: the fixes are mirrored, which fix_check tells, and not late
     if helps < HELPS_WARN or hurts > HURTS_SHARE * helps or not agrees:
         return [passed(name, "the motion does not tell whether {} and {} agree in time".format(
             stream.topic, reference),
@@ -171,6 +173,13 @@ def receiver_lag(evidence, kind, track, source=None):
     evidence.shift(kind, lag)  # so that the other checks see past it
     finding = failed if helps >= HELPS_FAIL else warned
     return [finding(name, text + named(lag, NAMED_WITHIN_MOTION_S), *change, **values)]
+
+
+def mirror_fits_better(track, t, q, lag):
+    """Whether a mirror image of the fixes without a lag fits the track better than the fixes with it."""
+    parts = motion_fit.most_turning(track, t, motion_fit.useful_windows(track, t, q, track.t))
+    late, mirrored = (motion_fit.read("", "", track, *series, parts) for series in ((t - lag, q), (t, np.conj(q))))
+    return motion_fit.gain(mirrored, late)[0] > 0.0
 
 
 def motion_lag(track, t, q, of_velocity):
