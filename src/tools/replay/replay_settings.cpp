@@ -49,7 +49,8 @@ constexpr std::pair<const char*, const char*> kWithoutOdometry[] = {
 };
 
 void assign_without_odometry(const LocalizerNodeSettings& localizer, YAML::Node& map) {
-  for (const ListedParameter& each : ParameterList().add(localizer).parameters()) {
+  const std::vector<ListedParameter> all = ParameterList().add(localizer).parameters();
+  for (const ListedParameter& each : all) {
     for (const auto& [name, value] : kWithoutOdometry) {
       if (each.name == name) assign(map, each.path(Layout::kTiered) + "=" + value);
     }
