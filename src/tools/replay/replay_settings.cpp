@@ -44,7 +44,7 @@ void assign_option(const std::string& text, Maps& maps) {
 /// Where the odometry is made of what the receiver says (odometry_of_velocities()): its errors are the velocity's, they
 /// come with every sample, and it tells neither how late the receiver is nor whether its speed is right.
 constexpr std::pair<const char*, const char*> kWithoutOdometry[] = {
-    {"position_walk", "0.5"},  {"parked_walk", "0.3"}, {"heading_walk", "0.1"},
+    {"position_walk", "2.0"},  {"parked_walk", "1.0"}, {"heading_walk", "0.3"},
     {"check_wheels", "false"}, {"fix_delay", "\"0\""}, {"initialization_timeout", "10.0"},
 };
 
