@@ -62,12 +62,13 @@ void assign_option(const std::string& text, Maps& maps) {
 /// Where the odometry is made of what the receiver says (odometry_of_velocities()): its errors are the velocity's, they
 /// come with every sample, and it tells neither how late the receiver is nor whether its speed is right.
 constexpr std::pair<const char*, const char*> kWithoutOdometry[] = {
-    {"position_walk", "0.5"},  {"parked_walk", "0.3"}, {"heading_walk", "0.1"},
+    {"position_walk", "2.0"},  {"parked_walk", "1.0"}, {"heading_walk", "0.3"},
     {"check_wheels", "false"}, {"fix_delay", "\"0\""}, {"initialization_timeout", "10.0"},
 };
 
 void assign_without_odometry(const LocalizerNodeSettings& localizer, YAML::Node& map) {
-  for (const ListedParameter& each : ParameterList().add(localizer).parameters()) {
+  const std::vector<ListedParameter> all = ParameterList().add(localizer).parameters();
+  for (const ListedParameter& each : all) {
     for (const auto& [name, value] : kWithoutOdometry) {
       if (each.name == name) assign(map, each.path(Layout::kTiered) + "=" + value);
     }
