@@ -58,6 +58,7 @@ GeodeticPosition LocalFrame::to_geodetic(const Eigen::Vector3d& enu) const {
 }
 
 double LocalFrame::convergence_rad(const GeodeticPosition& position) const {
+  if (!std::isfinite(position.latitude_deg) || !std::isfinite(position.longitude_deg)) return 0.0;
   double x, y, z;
   std::vector<double> rotation(9);  // of east, north, up at the place into the frame, row by row
   converter_.Forward(position.latitude_deg, position.longitude_deg, position.altitude_m, x, y, z, rotation);

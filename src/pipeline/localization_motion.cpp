@@ -19,6 +19,8 @@ namespace {
 constexpr double kKnownHeading_rad = 0.15;
 /// Share of a speed over ground by which the robot moves sideways.
 constexpr double kSideways = 0.1;
+/// Standard deviation of the heading after turns by a rate that was not the robot's.
+constexpr double kWrongTurns_rad = 1.0;
 
 }  // namespace
 
@@ -36,6 +38,7 @@ void LocalizationPipeline::add_odometry(const OdometrySample& message) {
   const Stamp since = history_.empty() ? sample.stamp : history_.latest();
   const double elapsed_s = to_seconds(sample.stamp - since);
   Twist2 twist = yaw_rate_.twist_of(sample, since, events_);
+  if (yaw_rate_.has_changed()) change_yaw_rate();
   speed_.set_wheels_contradicted(yaw_rate_.contradicts_wheels());
   twist.speed_mps = speed_.speed_of(twist.speed_mps, sample.stamp, elapsed_s, events_);
   if (elapsed_s > parameters_.input.stamps.odometry_gap) forget_odometry(elapsed_s);
@@ -61,6 +64,15 @@ void LocalizationPipeline::change_odometry() {
     localizer_->doubt(doubt);
   } else {
     start_.lose_place();  // what was found until now is of another motion
+  }
+}
+
+void LocalizationPipeline::change_yaw_rate() {
+  delay_.forget_odometry();
+  if (initialized()) {
+    localizer_->doubt({0.0, kWrongTurns_rad * kWrongTurns_rad});
+  } else {
+    start_.lose_place();  // what was found until now is of other turns
   }
 }
 

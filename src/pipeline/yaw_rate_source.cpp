@@ -22,6 +22,11 @@ constexpr double kNewsworthy_s = 0.15;
 /// A contradiction that is shorter is a glitch, or wheels that slip for a moment.
 constexpr double kLasting_s = 1.0;
 
+/// Whether an IMU of this verdict is used as it is told to be mounted.
+bool is_as_told(ImuVerdict verdict) {
+  return verdict == ImuVerdict::kUnknown || verdict == ImuVerdict::kScaled || verdict == ImuVerdict::kFits;
+}
+
 }  // namespace
 
 bool is_usable_yaw_rate(double yaw_rate_radps) {
@@ -38,6 +43,7 @@ void YawRateSource::add(const ImuYawRate& rate) {
 Twist2 YawRateSource::twist_of(const OdometrySample& step, Stamp since, std::vector<PipelineEvent>& events) {
   Twist2 twist = step.twist;
   doubt_rad2_ = 0.0;
+  has_changed_ = false;
   if (!parameters_.use_imu_yaw_rate) return twist;
   look_for_lead(step.stamp, twist.yaw_rate_radps, events);
   const Stamp lead = from_seconds(lead_s_);
@@ -45,7 +51,11 @@ Twist2 YawRateSource::twist_of(const OdometrySample& step, Stamp since, std::vec
   const double duration_s = to_seconds(step.stamp - since);
   watch(imu.has_value(), duration_s, events);
   if (!imu) return twist;
-  if (mounting_.add(twist.yaw_rate_radps, *imu, duration_s)) say_verdict(events);
+  const bool was_as_told = is_as_told(mounting_.verdict());
+  if (mounting_.add(twist.yaw_rate_radps, *imu, duration_s)) {
+    say_verdict(events);
+    has_changed_ = was_as_told != is_as_told(mounting_.verdict());
+  }
   if (const auto rate_radps = believed(*imu)) twist.yaw_rate_radps = judge(twist, *rate_radps, duration_s);
   return twist;
 }

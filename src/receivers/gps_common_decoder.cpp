@@ -59,7 +59,7 @@ void GpsCommonDecoder::add_fix(const MessageView& message, Stamp arrival) {
   lists_satellites_ = lists_satellites_ || !satellites.satellites.empty();
   add_satellites(std::move(satellites), is_new);
   if (!is_new) return;
-  statuses_.add_fix(stamp);
+  statuses_.add_fix(stamp_of(message, arrival), stamp);  // a GPSStatus is stamped as the GPSFix is, and has no time
   take_matched();
   on_fix(stamp);
 }

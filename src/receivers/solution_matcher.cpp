@@ -14,13 +14,13 @@ constexpr double kSurelySame = 0.25;  ///< of the interval between fixes
 
 }  // namespace
 
-void SolutionMatcher::add_fix(Stamp stamp) {
-  if (!fixes_.empty() && stamp <= fixes_.back()) {
-    if (stamp == fixes_.back()) return;
+void SolutionMatcher::add_fix(Stamp told, Stamp given) {
+  if (!fixes_.empty() && told <= fixes_.back().told) {
+    if (told == fixes_.back().told) return;
     fixes_.clear();  // the clock was set back
   }
-  if (!fixes_.empty()) interval_s_ = to_seconds(stamp - fixes_.back());
-  fixes_.push_back(stamp);
+  if (!fixes_.empty()) interval_s_ = to_seconds(told - fixes_.back().told);
+  fixes_.push_back({told, given});
   if (fixes_.size() > kMaxFixes) fixes_.pop_front();
   settle();
 }
@@ -38,7 +38,7 @@ double SolutionMatcher::reach_s() const { return std::min(0.5 * interval_s_, kMa
 
 bool SolutionMatcher::is_decided(const SatelliteEpoch& epoch) const {
   if (fixes_.empty()) return false;
-  return to_seconds(epoch.stamp - fixes_.back()) <= std::min(kSurelySame * interval_s_, reach_s());
+  return to_seconds(epoch.stamp - fixes_.back().told) <= std::min(kSurelySame * interval_s_, reach_s());
 }
 
 void SolutionMatcher::settle() {
@@ -49,11 +49,11 @@ void SolutionMatcher::settle() {
 }
 
 void SolutionMatcher::decide(SatelliteEpoch epoch) {
-  const auto distance_s = [&](Stamp fix) { return std::abs(to_seconds(fix - epoch.stamp)); };
-  const auto nearest =
-      std::min_element(fixes_.begin(), fixes_.end(), [&](Stamp a, Stamp b) { return distance_s(a) < distance_s(b); });
+  const auto distance_s = [&](const Fix& fix) { return std::abs(to_seconds(fix.told - epoch.stamp)); };
+  const auto nearest = std::min_element(fixes_.begin(), fixes_.end(),
+                                        [&](const Fix& a, const Fix& b) { return distance_s(a) < distance_s(b); });
   if (nearest != fixes_.end() && distance_s(*nearest) <= reach_s()) {
-    epoch.stamp = *nearest;
+    epoch.stamp = nearest->given;
   } else {
     for (SatelliteObservation& satellite : epoch.satellites) satellite.residual_m = SatelliteObservation::kUnknown;
   }

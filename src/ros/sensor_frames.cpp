@@ -8,6 +8,12 @@ namespace urban_gnss {
 
 using Level = PipelineEvent::Level;
 
+namespace {
+
+constexpr int kPatience_fixes = 5;
+
+}  // namespace
+
 void SensorFrames::observe_odometry(const std::string& frame, const std::string& child_frame) {
   if (has_odometry_) return;
   has_odometry_ = true;
@@ -30,10 +36,10 @@ void SensorFrames::observe(Sensor& sensor, const std::string& frame) {
 }
 
 void SensorFrames::observe_fix(const std::string& frame) {
-  const bool is_first = !antenna_.was_heard;
   if (!wants_antenna_) return;
   observe(antenna_, without_leading_slash(frame));
-  if (is_first && antenna_.frame.empty()) {
+  // A receiver_node does not know the frame of its first fixes, where the driver tells it in another message.
+  if (antenna_.frame.empty() && ++fixes_without_frame_ == kPatience_fixes) {
     say(Level::kWarn,
         "fixes have no frame_id: the antenna is taken to be at the base; set antenna_offset if it is elsewhere");
   }

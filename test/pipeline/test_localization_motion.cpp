@@ -315,6 +315,7 @@ TEST(LocalizationMotion, YawRateIsThatOfTheRobotHoweverTheImuIsMounted) {
     const double used_radps = rig.fake->moves.back().first.yaw_rate_radps;
     EXPECT_NEAR(used_radps, Rig::kTwist.yaw_rate_radps + (told || gravity ? 0.001 : 0.0), 1e-9);
     EXPECT_EQ(has_event(rig.pipeline, Level::kWarn, "times the odometry's"), !told);
+    EXPECT_EQ(rig.fake->doubted.heading_rad2 > 0.9, !told);
   }
 }
 

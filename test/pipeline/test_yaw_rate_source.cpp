@@ -102,6 +102,20 @@ TEST(YawRateSource, StepOfTheGyroscopeIsLeftOutWithADoubt) {
   EXPECT_EQ(steps.source.complaint(), "");
 }
 
+TEST(YawRateSource, WhatWasTurnedByAnImuUpsideDownIsToldOnce) {
+  Steps steps;
+  int changes = 0;
+  double rate = 0.0;
+  for (int k = 0; k < 600; ++k) {
+    steps.odometry_radps = 0.3 * std::sin(0.05 * k);
+    steps.imu(steps.time + 0.05, -steps.odometry_radps);
+    rate = steps.step();
+    changes += steps.source.has_changed();
+  }
+  EXPECT_EQ(changes, 1);
+  EXPECT_EQ(rate, steps.odometry_radps);
+}
+
 TEST(YawRateSource, WheelsThatTurnAloneAreContradicted) {
   YawRateSource source({true}, 2.0);
   std::vector<PipelineEvent> events;

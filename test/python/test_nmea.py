@@ -240,7 +240,7 @@ class ReplayTest(unittest.TestCase):
                 log.write(sentence("GNGST,%s,1.0,,,,1.0,1.0,2.0" % clock))
                 log.write(sentence("GNGST,%s,1.0,,,,9.0,9.0,9.0" % clock).replace("9.0", "8.0", 1))
                 if with_date:
-                    log.write(sentence("GNRMC,%s,A,%s,,,010170,,,A" % (clock, place)))
+                    log.write(sentence("GNZDA,%s,01,01,1970,00,00" % clock))  # RMC's year has two digits
         return self.file("drive.nmea")
 
     def replay(self, *options):

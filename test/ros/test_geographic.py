@@ -1,16 +1,20 @@
 #!/usr/bin/env python3
 """Between latitude and longitude and the map: the array services, gps/filtered, and geographic targets."""
 import math
+import os
+import sys
 
-import drive
 import rospy
 import rostest
 from geometry_msgs.msg import Point, Twist
-from localizer_case import LocalizerCase
 from nav_msgs.msg import Odometry, Path
 from sensor_msgs.msg import NavSatFix
 from urban_gnss_localization.msg import LocalizationStatus
 from urban_gnss_localization.srv import FromLLArray, ToLLArray
+
+sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
+import drive  # noqa: E402
+from localizer_case import LocalizerCase  # noqa: E402
 
 TARGETS = ((48.1376, 11.5760), (48.1370, 11.5765))
 

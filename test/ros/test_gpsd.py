@@ -138,7 +138,8 @@ class GpsdTest(unittest.TestCase):
                 self.stop()
                 self.check_epochs()
                 self.wait(lambda: self.diagnosis[0] == 2 and "no gpsd" in self.diagnosis[1], "the end was not noticed")
-            self.assertEqual(int(self.diagnosis[2]["connections"]), connections + 2)
+            # A gpsd that ends may accept one more.
+            self.assertGreaterEqual(int(self.diagnosis[2]["connections"]), connections + 2)
             self.assertEqual(self.diagnosis[2]["release"], "")
 
     @unittest.skipUnless(os.path.isfile(RECORDED), "URBAN_GNSS_DATA has no nmea/")

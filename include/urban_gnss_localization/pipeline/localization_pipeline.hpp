@@ -122,6 +122,7 @@ class LocalizationPipeline {
   void forget_odometry(double gap_s);
   /// The odometry is moved by another part of its messages from now on.
   void change_odometry();
+  void change_yaw_rate();
   void process_velocities();
   void process_velocity(const RawVelocity& velocity);
   /// rad, by which what the receiver calls east is turned from the map's x axis, counter-clockwise.

@@ -63,6 +63,10 @@ class YawRateSource {
   /// rad^2, by what the heading's variance grew in the last step beyond the odometry's model.
   double doubt_rad2() const { return doubt_rad2_; }
 
+  /// Whether the rate that is believed became another one in the last step, as the IMU's was not the robot's: what was
+  /// turned by it until now is wrong.
+  bool has_changed() const { return has_changed_; }
+
   /// Whether the wheels turn the robot where it does not turn, or the other way round: their speed is wrong, too.
   bool contradicts_wheels() const;
   /// Which of the two contradicts the other; empty where neither does.
@@ -101,6 +105,7 @@ class YawRateSource {
   double lead_s_{0.0};
   ImuMountingCheck mounting_;
   bool imu_is_doubted_{false};
+  bool has_changed_{false};
   YawRateArbiter arbiter_;
   LastingDoubt doubt_;
   double doubt_rad2_{0.0};

@@ -13,7 +13,10 @@ namespace urban_gnss {
 class SolutionMatcher {
  public:
   /// The stamps of fixes must ascend.
-  void add_fix(Stamp stamp);
+  void add_fix(Stamp stamp) { add_fix(stamp, stamp); }
+  /// The same where the stamps that are compared are not those that are given: `told` by the clock that stamps the
+  /// satellites.
+  void add_fix(Stamp told, Stamp given);
   /// `epoch.stamp`: as its own message has it.
   void add_satellites(SatelliteEpoch epoch);
   /// Nothing more comes.
@@ -29,7 +32,11 @@ class SolutionMatcher {
   void decide(SatelliteEpoch epoch);
   void settle();
 
-  std::deque<Stamp> fixes_;
+  struct Fix {
+    Stamp told;
+    Stamp given;
+  };
+  std::deque<Fix> fixes_;
   double interval_s_{1.0};
   std::deque<SatelliteEpoch> waiting_;
   std::vector<SatelliteEpoch> done_;

@@ -45,6 +45,7 @@ class SensorFrames {
   bool wants_antenna_;
   bool has_odometry_{false};
   Sensor antenna_;
+  int fixes_without_frame_{0};
   Sensor imu_;
   std::vector<PipelineEvent> events_;
 };
