@@ -10,7 +10,8 @@
 namespace urban_gnss {
 namespace {
 
-constexpr std::size_t kEpochs = 15;
+constexpr std::size_t kEpochs = 60;
+constexpr std::size_t kLeastEpochs = 20;
 constexpr Eigen::Index kLeastSpare = 2;
 constexpr double kLeastSine = 0.05;  ///< of an elevation, for the weights
 constexpr double kCn0Unknown_dbhz = 35.0;
@@ -71,7 +72,7 @@ void ResidualCheck::add(const std::vector<SatelliteObservation>& satellites) {
 }
 
 bool ResidualCheck::belong() const {
-  if (misfits_.empty()) return true;
+  if (misfits_.size() < kLeastEpochs) return true;
   return upper_median(std::vector<double>(misfits_.begin(), misfits_.end())) <= parameters_.residual_misfit_limit;
 }
 

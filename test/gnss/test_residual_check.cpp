@@ -79,24 +79,16 @@ TEST(ResidualMisfit, OfNoResidualAtAllIsNothing) {
 TEST(ResidualCheck, GoesByTheMedianOfTheLastEpochs) {
   RandomEngine engine = make_engine(305);
   ResidualCheck check{ResidualCheckParameters{}};
-  EXPECT_TRUE(check.belong());
-  for (int k = 0; k < 20; ++k) {
-    check.add(solved(noisy(engine), by_cn0));
-    EXPECT_TRUE(check.belong());
-  }
-  for (int k = 0; k < 7; ++k) check.add(seen_from_beside(solved(noisy(engine), by_cn0), 30.0));
-  EXPECT_TRUE(check.belong());
-  check.add(seen_from_beside(solved(noisy(engine), by_cn0), 30.0));
-  EXPECT_FALSE(check.belong());
-  for (int k = 0; k < 8; ++k) check.add(solved(noisy(engine), by_cn0));
-  EXPECT_TRUE(check.belong());
-}
-
-TEST(ResidualCheck, NoiseIsNoSolution) {
-  RandomEngine engine = make_engine(306);
-  ResidualCheck check{ResidualCheckParameters{}};
-  for (int k = 0; k < 15; ++k) check.add(noisy(engine));
-  EXPECT_FALSE(check.belong());
+  const auto add = [&](int count, double east_m) {
+    for (int k = 0; k < count; ++k) check.add(seen_from_beside(solved(noisy(engine), by_cn0), east_m));
+    return check.belong();
+  };
+  EXPECT_TRUE(add(19, 60.0)) << "too few to judge";
+  EXPECT_FALSE(add(1, 60.0));
+  EXPECT_TRUE(add(21, 0.0));
+  EXPECT_TRUE(add(39, 0.0));
+  EXPECT_TRUE(add(29, 60.0));
+  EXPECT_FALSE(add(2, 60.0));
 }
 
 }  // namespace

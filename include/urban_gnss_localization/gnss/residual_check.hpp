@@ -10,7 +10,7 @@
 namespace urban_gnss {
 
 struct ResidualCheckParameters {
-  double residual_misfit_limit{0.3};
+  double residual_misfit_limit{1.0};
 
   void visit(ParameterVisitor& v) {
     v("residual_misfit_limit", residual_misfit_limit, positive(), "",
@@ -28,9 +28,10 @@ struct ResidualCheckParameters {
 /// Nothing where fewer than 2 ranges more than unknowns are known: what is explained then says nothing.
 std::optional<double> residual_misfit(const std::vector<SatelliteObservation>& satellites);
 
-/// Whether a receiver's residuals are those of its fixes, by the median of its last epochs. Another solution's
-/// residuals (of a filter, say, beside fixes of least squares, or the other way round) would move a fix by the
-/// difference.
+/// Whether a receiver's residuals are those of its fixes, by the median of its last 60 epochs, once there are 20.
+/// Residuals of another place would move a fix by the difference. Those of a filtered fix are no solution's either, but
+/// tell the ranges all the same if they are taken at the fix: simulated ones have 0.1 to 0.9, so the limit is above.
+/// Residuals of another epoch, or of a place a few metres beside, are not found.
 class ResidualCheck {
  public:
   /// Requires parameters without faults.
