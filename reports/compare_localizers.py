@@ -11,12 +11,10 @@ The workspace must be sourced, or URBAN_GNSS_PROGRAMS be the folder of the built
 """
 
 import argparse
-import concurrent.futures
 import json
 import math
 import os
 import re
-import subprocess
 import sys
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
@@ -24,9 +22,10 @@ sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import numpy as np  # noqa: E402
 
 import report_common as common  # noqa: E402
+from recordings import (NEEDED, add_arguments, call, for_each_recording, make_bag, markdown,  # noqa: E402, F401
+                        program, replace_between, set_arguments, write_docs)
 from report_common import plt  # noqa: E402
 
-NEEDED = ("gnss.csv", "odom.csv", "truth.csv", "meta.json")
 ESTIMATE = "odometry/filtered"
 RAW_FIX = "raw fix"
 
@@ -53,8 +52,6 @@ ABLATIONS = {
     "heavy tails, outliers": ["expert.bias.student_dof=1.0e+9", "expert.bias.outlier_share=0.0"],
     "biased modes": ["expert.bias.direct_time=1.0e+15"],
 }
-
-LONGEST_LINE = 120  # characters, in docs/
 
 DIVERGED_M = 100.0
 DIVERGED_S = 30.0
@@ -93,50 +90,9 @@ class Scores:
         return text + (" †" if self.has_diverged() else "")
 
 
-def program(name):
-    """The command that starts one of the package's programs."""
-    programs = os.environ.get("URBAN_GNSS_PROGRAMS")
-    return [os.path.join(programs, name)] if programs else ["rosrun", "urban_gnss_localization", name]
-
-
-def call(*command):
-    """Run a program and give its output; a failure ends everything with its last line."""
-    try:
-        done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, universal_newlines=True)
-    except OSError as error:
-        raise common.ReportError("{}: {}".format(command[0], error.strerror))
-    if done.returncode != 0:
-        lines = (done.stderr.strip() or done.stdout.strip() or "failed without a word").splitlines()
-        raise common.ReportError("{}: {}".format(os.path.basename(command[0]), lines[-1]))
-    return done.stdout
-
-
 def find_variants():
     """The names under which the registry's localizers are compared."""
     return call(*program("replay"), "--list-variants").split()
-
-
-def find_recordings(directory, chosen):
-    """Names of the folders that can be evaluated, in alphabetical order."""
-    if not directory or not os.path.isdir(directory):
-        raise common.ReportError("{}: no folder of recordings (--data or URBAN_GNSS_DATA)".format(directory or "?"))
-    found = sorted(name for name in os.listdir(directory)
-                   if all(os.path.isfile(os.path.join(directory, name, file)) for file in NEEDED))
-    for name in chosen:
-        if name not in found:
-            raise common.ReportError("{}: no recording {} with {}".format(directory, name, ", ".join(NEEDED)))
-    found = [name for name in found if not chosen or name in chosen]
-    if not found:
-        raise common.ReportError("{}: no recording with {}".format(directory, ", ".join(NEEDED)))
-    return found
-
-
-def make_bag(folder, bag):
-    """Convert a recording, unless that has been done since it changed."""
-    files = [os.path.join(folder, name) for name in os.listdir(folder)]
-    if os.path.exists(bag) and os.path.getmtime(bag) > max(os.path.getmtime(file) for file in files):
-        return
-    call(*program("csv_to_bag"), folder, bag)
 
 
 def file_name(method):
@@ -271,50 +227,6 @@ def inside(score):
     return "–" if share is None else "{:.2f}".format(share)
 
 
-def markdown(header, rows):
-    """The table as Markdown: several, each with the first column, where one had lines longer than LONGEST_LINE."""
-    tables, begin = [], 1
-    while begin < len(header):
-        end = begin + 1
-        while end < len(header) and is_narrow(part(header, rows, begin, end + 1)):
-            end += 1
-        tables.append("\n".join(part(header, rows, begin, end)))
-        begin = end
-    return "\n\n".join(tables)
-
-
-def part(header, rows, begin, end):
-    """The lines of a Markdown table of the first column and those from `begin` up to `end`."""
-    head = header[:1] + header[begin:end]
-    lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
-    return lines + ["| " + " | ".join(["`" + row[0] + "`"] + row[begin:end]) + " |" for row in rows]
-
-
-def is_narrow(lines):
-    """Whether no line is longer than the pages of docs/ allow."""
-    return max(len(line) for line in lines) <= LONGEST_LINE
-
-
-def replace_between(text, name, content, path):
-    """The text with what stands between the markers of `name` replaced."""
-    begin, end = "<!-- {} -->".format(name), "<!-- end of {} -->".format(name)
-    if text.count(begin) != 1 or text.count(end) != 1 or text.index(begin) > text.index(end):
-        raise common.ReportError("{}: needs the markers {} and {}, each once".format(path, begin, end))
-    head, rest = text.split(begin)
-    return head + begin + "\n" + content + "\n" + end + rest.split(end)[1]
-
-
-def write_docs(path, name, content):
-    """Renew one table of a Markdown file."""
-    try:
-        with open(path, encoding="utf-8") as stream:
-            text = replace_between(stream.read(), name, content, path)
-        with open(path, "w", encoding="utf-8") as stream:
-            stream.write(text)
-    except OSError as error:
-        raise common.ReportError("{}: {}".format(path, error.strerror))
-
-
 def ratios(results, method, reference):
     """Geometric means over the recordings of median and 95 % of a method against another's."""
     logs = [[math.log(scores[method].percentile(p) / scores[reference].percentile(p)) for p in (50, 95)]
@@ -336,21 +248,16 @@ def ablate(results):
 
 def compare(options):
     """Run everything; gives the path of the page."""
-    recordings = find_recordings(options.data, options.recordings)
     if options.ablation:
         methods = {ABLATED: ["--localizer", ABLATED]}
         methods.update({name: methods[ABLATED] + [part for text in changes for part in ("--set", text)]
                         for name, changes in ABLATIONS.items()})
     else:
         methods = {name: ["--localizer", name] for name in options.methods or find_variants()}
-    overrides = [part for text in options.overrides for part in ("--set", text)]
-    results, tracks = {}, {}
-    with concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
-        futures = {name: pool.submit(run_recording, options.data, options.output, name, methods, overrides)
-                   for name in recordings}
-        for done, (name, future) in enumerate(futures.items(), 1):
-            results[name], tracks[name] = future.result()
-            print("{}/{} {}".format(done, len(recordings), name), file=sys.stderr)
+    runs = for_each_recording(options, lambda name: run_recording(options.data, options.output, name, methods,
+                                                                  set_arguments(options)))
+    results = {name: scores for name, (scores, _) in runs.items()}
+    tracks = {name: recorded for name, (_, recorded) in runs.items()}
     return write_report(options, methods, results, tracks)
 
 
@@ -384,16 +291,10 @@ def write_report(options, methods, results, tracks):
 def main():
     """Read the command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("output", help="folder for bags, runs, figures and the report")
-    parser.add_argument("--data", default=os.environ.get("URBAN_GNSS_DATA"), help="default: $URBAN_GNSS_DATA")
-    parser.add_argument("--docs", help="Markdown file whose tables are renewed, e.g. docs/results/recordings.md")
-    parser.add_argument("--recordings", nargs="+", default=[], help="default: all with truth")
+    add_arguments(parser, "folder for bags, runs, figures and the report")
     parser.add_argument("--methods", nargs="+", help="names of replay --list-variants; default: all")
     parser.add_argument("--ablation", action="store_true", help="the recommended localizer without each of its "
                         "sources of information, instead of all localizers")
-    parser.add_argument("--set", action="append", default=[], dest="overrides", metavar="NAME=VALUE",
-                        help="a parameter for every run; repeatable")
-    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="recordings at once")
     try:
         print(compare(parser.parse_args()))
     except common.ReportError as error:

@@ -12,7 +12,6 @@ The workspace must be sourced, or URBAN_GNSS_PROGRAMS be the folder of the built
 """
 
 import argparse
-import concurrent.futures
 import json
 import os
 import statistics
@@ -20,7 +19,7 @@ import sys
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 
-import compare_localizers as recordings  # noqa: E402
+import recordings  # noqa: E402
 import report_common as common  # noqa: E402
 
 GOOD_SHARE = 0.88  # of the truth inside the 95 % ellipse
@@ -42,10 +41,9 @@ def span_of(folder):
 
 def replay_from(bag, start_s, options, path):
     """What replay says of a part of the bag; None where there was no estimate in it."""
-    overrides = [part for text in options.overrides for part in ("--set", text)]
     try:
         recordings.call(*recordings.program("replay"), bag, "--localizer", options.localizer, "--start", str(start_s),
-                        "--duration", str(options.duration), "--json", path, *overrides)
+                        "--duration", str(options.duration), "--json", path, *recordings.set_arguments(options))
     except common.ReportError as error:
         if "no estimate" in str(error):
             return None
@@ -100,13 +98,7 @@ def total_of(rows):
 
 def compare(options):
     """Run everything; gives the path of the results."""
-    names = recordings.find_recordings(options.data, options.recordings)
-    results = {}
-    with concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
-        futures = {name: pool.submit(run_recording, name, options) for name in names}
-        for done, (name, future) in enumerate(futures.items(), 1):
-            results[name] = future.result()
-            print("{}/{} {}".format(done, len(names), name), file=sys.stderr)
+    results = recordings.for_each_recording(options, lambda name: run_recording(name, options))
     rows = [row_of(name, runs) for name, runs in results.items()]
     rows.append(total_of(rows))
     print(recordings.markdown(HEADER, rows))
@@ -121,16 +113,10 @@ def compare(options):
 def main():
     """Read the command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("output", help="folder for bags and results")
-    parser.add_argument("--data", default=os.environ.get("URBAN_GNSS_DATA"), help="default: $URBAN_GNSS_DATA")
-    parser.add_argument("--docs", help="Markdown file whose table is renewed, e.g. docs/results/recordings.md")
-    parser.add_argument("--recordings", nargs="+", default=[], help="default: all with truth")
+    recordings.add_arguments(parser, "folder for bags and results")
     parser.add_argument("--localizer", default="imm_ekf")
     parser.add_argument("--starts", type=int, default=20, help="a recording")
     parser.add_argument("--duration", type=float, default=90.0, help="s of each run")
-    parser.add_argument("--set", action="append", default=[], dest="overrides", metavar="NAME=VALUE",
-                        help="a parameter for every run; repeatable")
-    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="recordings at once")
     try:
         print(compare(parser.parse_args()))
     except common.ReportError as error:

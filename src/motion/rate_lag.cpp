@@ -16,12 +16,13 @@ constexpr double kTurning_radps = 0.02;
 
 }  // namespace
 
-void RateLagSearch::add(Stamp stamp, double odometry_radps, const RateAt& imu_at) {
-  if (last_ && to_seconds(stamp - *last_) < kStep_s) return;
+bool RateLagSearch::add(Stamp stamp, double odometry_radps, const RateAt& imu_at) {
+  if (last_ && to_seconds(stamp - *last_) < kStep_s) return false;
   last_ = stamp;
   waiting_.push_back({stamp, odometry_radps});
   // So long that the rates of an IMU that is behind by that much have come, too.
   const double reach_s = 2.0 * kMostSteps * kStep_s;
+  const int count_before = count_;
   while (!waiting_.empty() && to_seconds(stamp - waiting_.front().stamp) > reach_s) {
     const Rate then = waiting_.front();
     waiting_.pop_front();
@@ -40,6 +41,7 @@ void RateLagSearch::add(Stamp stamp, double odometry_radps, const RateAt& imu_at
       product_[i] += then.radps * rates[i];
     }
   }
+  return count_ > count_before;
 }
 
 std::optional<double> RateLagSearch::lead_s() const {

@@ -2,17 +2,15 @@
 // Parameters: ReceiverNodeParameters (docs/parameters.md); the topics of each driver are in docs/receivers.md.
 
 #include <diagnostic_updater/diagnostic_updater.h>
-#include <geometry_msgs/TwistWithCovarianceStamped.h>
 #include <ros/ros.h>
-#include <sensor_msgs/NavSatFix.h>
 #include <topic_tools/shape_shifter.h>
-#include <urban_gnss_localization/SatelliteArray.h>
 
 #include "urban_gnss_localization/receivers/receiver_input.hpp"
 #include "urban_gnss_localization/ros/conversions.hpp"
 #include "urban_gnss_localization/ros/node_parameters.hpp"
 #include "urban_gnss_localization/ros/receiver_messages.hpp"
 #include "urban_gnss_localization/ros/receiver_node_parameters.hpp"
+#include "urban_gnss_localization/ros/receiver_publishers.hpp"
 #include "urban_gnss_localization/ros/topics.hpp"
 
 using namespace urban_gnss;
@@ -28,10 +26,8 @@ class ReceiverNode {
       : parameters_(read(private_node)),
         preset_(find_receiver_preset(parameters_.receiver)),
         input_(preset_),
+        publishers_(node),
         diagnostics_(ros::NodeHandle(), private_node) {
-    fix_publisher_ = node.advertise<sensor_msgs::NavSatFix>(topics::kFix, 100);
-    velocity_publisher_ = node.advertise<geometry_msgs::TwistWithCovarianceStamped>(topics::kVelocity, 100);
-    satellites_publisher_ = node.advertise<urban_gnss_localization::SatelliteArray>(topics::kSatellites, 100);
     for (const ReceiverTopic& topic : preset_.topics) subscribe(node, topic);
     diagnostics_.setHardwareID(preset_.driver);
     diagnostics_.add("receiver", this, &ReceiverNode::diagnose);
@@ -60,22 +56,8 @@ class ReceiverNode {
   }
 
   void on_message(const std::string& name, const ReceiverTopic& topic, const ShapeEvent& event) {
-    const ShapeShifter& message = *event.getConstMessage();
-    std::vector<std::uint8_t> bytes(message.size());
-    ros::serialization::OStream stream(bytes.data(), static_cast<std::uint32_t>(bytes.size()));
-    message.write(stream);
-    const MessageConnection connection{name, message.getDataType(), message.getMD5Sum(),
-                                       message.getMessageDefinition()};
-    input_.add(topic, connection, bytes.data(), bytes.size(), to_stamp(event.getReceiptTime()));
-    publish(input_.take());
-  }
-
-  void publish(const ReceiverOutput& output) {
-    const std::string& frame = parameters_.frame.empty() ? input_.frame_id() : parameters_.frame;
-    for (const std::string& warning : output.warnings) ROS_WARN_STREAM(warning);
-    for (const RawFix& fix : output.fixes) fix_publisher_.publish(to_message(fix, frame));
-    for (const RawVelocity& velocity : output.velocities) velocity_publisher_.publish(to_message(velocity, frame));
-    for (const SatelliteEpoch& epoch : output.satellites) satellites_publisher_.publish(to_message(epoch, frame));
+    add_message(*event.getConstMessage(), name, topic, to_stamp(event.getReceiptTime()), input_);
+    publishers_.publish(input_.take(), parameters_.frame.empty() ? input_.frame_id() : parameters_.frame);
   }
 
   std::string subscribed() const {
@@ -91,10 +73,8 @@ class ReceiverNode {
     std::string names;
     for (const ros::master::TopicInfo& info : all) {
       for (const ReceiverTopic& topic : preset_.topics) {
-        const std::string end = std::string("/") + topic.name;
-        const bool ends_so =
-            info.name.size() >= end.size() && info.name.compare(info.name.size() - end.size(), end.size(), end) == 0;
-        if (ends_so && is_type_of(topic, info.datatype)) names += " " + info.name;
+        const bool is_so_called = namespace_of(without_leading_slash(info.name), topic).has_value();
+        if (is_so_called && is_type_of(topic, info.datatype)) names += " " + info.name;
       }
     }
     return names.empty() ? "" : "; there are" + names + ": receiver_ns:= says where";
@@ -120,12 +100,7 @@ class ReceiverNode {
       status.summary(DiagnosticStatus::OK, "fixes with satellites");
     }
     status.add("receiver", preset_.name);
-    status.add("fixes", counts.fixes);
-    status.add("solutions without a fix", counts.no_fixes);
-    status.add("velocities", counts.velocities);
-    status.add("lists of satellites", counts.epochs);
-    status.add("fixes with satellites", counts.fixes_with_satellites);
-    status.add("fixes with residuals", counts.fixes_with_residuals);
+    add_counts(counts, status);
     for (const auto& [topic, count] : input_.received()) status.add("messages on " + topic, count);
     for (const auto& [topic, count] : input_.unreadable()) status.add("unreadable messages on " + topic, count);
   }
@@ -133,9 +108,7 @@ class ReceiverNode {
   const ReceiverNodeParameters parameters_;
   const ReceiverPreset& preset_;
   ReceiverInput input_;
-  ros::Publisher fix_publisher_;
-  ros::Publisher velocity_publisher_;
-  ros::Publisher satellites_publisher_;
+  ReceiverPublishers publishers_;
   std::vector<ros::Subscriber> subscribers_;
   diagnostic_updater::Updater diagnostics_;
   ros::WallTimer second_timer_;

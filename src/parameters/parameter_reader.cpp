@@ -169,8 +169,9 @@ void ParameterReader::on_list(const ParameterKey& key, std::vector<double>& valu
       node = YAML::Load(node.Scalar());
       value = node.as<std::vector<double>>();
     } catch (const YAML::Exception&) {
-      if (!flattened(node)) return bad_value(key, "must be a list of numbers");
-      value = *flattened(node);
+      const auto flat = flattened(node);
+      if (!flat) return bad_value(key, "must be a list of numbers");
+      value = *flat;
     }
   } else if (const auto flat = flattened(node)) {
     value = *flat;

@@ -53,7 +53,7 @@ void LocalizationPipeline::reset(const std::string& why) {
   fixes_.reset();
   delay_.reset();
   satellites_.reset();
-  residuals_ = ResidualCheck(parameters_.satellites.residuals);
+  residuals_.reset();
   biases_.reset();
   start_.reset();
   integrity_.reset();

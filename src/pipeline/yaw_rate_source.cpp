@@ -127,11 +127,12 @@ std::size_t YawRateSource::first_after(Stamp stamp) const {
 
 void YawRateSource::look_for_lead(Stamp stamp, double odometry_radps, std::vector<PipelineEvent>& events) {
   if (rates_.empty()) return;
-  lag_.add(stamp, odometry_radps, [this](Stamp at) -> std::optional<double> {
+  const bool is_news = lag_.add(stamp, odometry_radps, [this](Stamp at) -> std::optional<double> {
     const std::size_t i = first_after(at);
     if (i == 0 || i == rates_.size()) return std::nullopt;
     return rates_[i].told_radps;
   });
+  if (!is_news) return;
   const auto found = lag_.lead_s();
   if (!found || std::abs(*found - lead_s_) < kNewsworthy_s) return;
   lead_s_ = *found;

@@ -13,7 +13,8 @@ constexpr std::int64_t kGpsEpoch_s = 315964800;  ///< 1980-01-06
 constexpr std::int64_t kLeapSeconds[] = {915148800, 1136073600, 1230768000, 1341100800, 1435708800, 1483228800};
 constexpr std::int64_t kFirstLead_s = 13;
 
-/// Days since 1970-01-01 of a day of the Gregorian calendar.
+}  // namespace
+
 std::int64_t days_from_civil(std::int64_t year, std::int64_t month, std::int64_t day) {
   const std::int64_t y = month <= 2 ? year - 1 : year;
   const std::int64_t era = (y >= 0 ? y : y - 399) / 400;
@@ -21,8 +22,6 @@ std::int64_t days_from_civil(std::int64_t year, std::int64_t month, std::int64_t
   const std::int64_t day_of_year = (153 * (month + (month > 2 ? -3 : 9)) + 2) / 5 + day - 1;
   return 146097 * era + 365 * year_of_era + year_of_era / 4 - year_of_era / 100 + day_of_year - 719468;
 }
-
-}  // namespace
 
 Stamp to_stamp(const UtcTime& time) {
   const std::int64_t days = days_from_civil(time.year, time.month, time.day);

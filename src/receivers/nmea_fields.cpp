@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "urban_gnss_localization/receivers/gps_time.hpp"
+
 namespace urban_gnss {
 namespace {
 
@@ -85,14 +87,9 @@ std::optional<Stamp> to_time_of_day(std::string_view field) {
 
 std::optional<Day> to_day(int year, int month, int day) {
   if (year < 1970 || year > 2200 || month < 1 || month > 12 || day < 1) return std::nullopt;
-  constexpr int kLengths[] = {31, 28, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31};
-  const auto is_leap = [](int y) { return y % 4 == 0 && (y % 100 != 0 || y % 400 == 0); };
-  const auto length = [&](int m) { return kLengths[m - 1] + (m == 2 && is_leap(year) ? 1 : 0); };
-  if (day > length(month)) return std::nullopt;
-  Day days = 0;
-  for (int y = 1970; y < year; ++y) days += is_leap(y) ? 366 : 365;
-  for (int m = 1; m < month; ++m) days += length(m);
-  return days + day - 1;
+  const std::int64_t first = days_from_civil(year, month, 1);
+  if (day > days_from_civil(year, month + 1, 1) - first) return std::nullopt;
+  return static_cast<Day>(first + day - 1);
 }
 
 std::optional<Day> to_day(std::string_view ddmmyy) {

@@ -1,16 +1,12 @@
 #include "urban_gnss_localization/receivers/nmea_satellite_id.hpp"
 
+#include "satellite_number_range.hpp"
+
 namespace urban_gnss {
 namespace {
 
-struct NumberRange {
-  Constellation constellation;
-  int first, last;  ///< as sentences have them
-  int first_svid;
-};
-
 /// In sentences of any system, or of a system that is not known.
-constexpr NumberRange kShared[] = {
+constexpr SatelliteNumberRange kShared[] = {
     {Constellation::kGps, 1, 32, 1},       {Constellation::kSbas, 33, 64, 120},
     {Constellation::kGlonass, 65, 99, 1},  {Constellation::kSbas, 120, 158, 120},
     {Constellation::kImes, 173, 182, 1},   {Constellation::kQzss, 193, 200, 1},
@@ -19,15 +15,10 @@ constexpr NumberRange kShared[] = {
 };
 
 /// In sentences of the system itself, before the shared ones.
-constexpr NumberRange kOwn[] = {
+constexpr SatelliteNumberRange kOwn[] = {
     {Constellation::kGlonass, 1, 32, 1}, {Constellation::kGalileo, 1, 36, 1}, {Constellation::kBeidou, 1, 63, 1},
     {Constellation::kQzss, 1, 10, 1},    {Constellation::kQzss, 193, 202, 1}, {Constellation::kNavic, 1, 15, 1},
 };
-
-std::optional<SatelliteId> in(const NumberRange& range, int number) {
-  if (number < range.first || number > range.last) return std::nullopt;
-  return SatelliteId{range.constellation, range.first_svid + number - range.first};
-}
 
 }  // namespace
 
@@ -48,14 +39,11 @@ Constellation nmea_system(std::string_view talker, std::string_view system_id) {
 }
 
 std::optional<SatelliteId> nmea_satellite_id(Constellation system, int number) {
-  for (const NumberRange& range : kOwn) {
+  for (const SatelliteNumberRange& range : kOwn) {
     if (range.constellation != system) continue;
-    if (const auto id = in(range, number)) return id;
+    if (const auto id = range.id_of(number)) return id;
   }
-  for (const NumberRange& range : kShared) {
-    if (const auto id = in(range, number)) return id;
-  }
-  return std::nullopt;
+  return id_in(kShared, number);
 }
 
 }  // namespace urban_gnss

@@ -112,6 +112,13 @@ std::string full_name(const std::string& ns, const ReceiverTopic& topic) {
   return ns.back() == '/' ? ns + topic.name : ns + "/" + topic.name;
 }
 
+std::optional<std::string> namespace_of(const std::string& full, const ReceiverTopic& topic) {
+  if (full == topic.name) return "/";
+  const std::string end = std::string("/") + topic.name;
+  if (full.size() <= end.size() || full.compare(full.size() - end.size(), end.size(), end) != 0) return std::nullopt;
+  return full.substr(0, full.size() - end.size());
+}
+
 std::string why_not_a_receiver(const std::string& topic) {
   for (const std::string fused : {"global_position/global", "global_position/local"}) {
     const bool is_it = topic.size() >= fused.size() && topic.substr(topic.size() - fused.size()) == fused;

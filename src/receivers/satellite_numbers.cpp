@@ -1,22 +1,17 @@
 #include "urban_gnss_localization/receivers/satellite_numbers.hpp"
 
+#include "satellite_number_range.hpp"
 #include "urban_gnss_localization/receivers/nmea_satellite_id.hpp"
 
 namespace urban_gnss {
 namespace {
 
-struct Range {
-  Constellation constellation;
-  int first, last;
-  int first_svid;
-};
-
-constexpr Range kUbloxSvinfo[] = {
+constexpr SatelliteNumberRange kUbloxSvinfo[] = {
     {Constellation::kGps, 1, 32, 1},       {Constellation::kBeidou, 33, 64, 6},    {Constellation::kGlonass, 65, 96, 1},
     {Constellation::kSbas, 120, 158, 120}, {Constellation::kBeidou, 159, 163, 1},  {Constellation::kImes, 173, 182, 1},
     {Constellation::kQzss, 193, 202, 1},   {Constellation::kGalileo, 211, 246, 1},
 };
-constexpr Range kSeptentrio[] = {
+constexpr SatelliteNumberRange kSeptentrio[] = {
     {Constellation::kGps, 1, 37, 1},        {Constellation::kGlonass, 38, 61, 1},
     {Constellation::kGlonass, 63, 68, 25},  {Constellation::kGalileo, 71, 106, 1},
     {Constellation::kSbas, 120, 140, 120},  {Constellation::kBeidou, 141, 180, 1},
@@ -25,43 +20,30 @@ constexpr Range kSeptentrio[] = {
     {Constellation::kBeidou, 223, 245, 41},
 };
 /// Of a channel whose status says GPS, which is also that of a channel without a status.
-constexpr Range kNovatelByNumber[] = {
+constexpr SatelliteNumberRange kNovatelByNumber[] = {
     {Constellation::kGps, 1, 32, 1},
     {Constellation::kGlonass, 38, 61, 1},
     {Constellation::kSbas, 120, 158, 120},
     {Constellation::kQzss, 193, 202, 1},
 };
-constexpr Range kNovatelBySystem[] = {
+constexpr SatelliteNumberRange kNovatelBySystem[] = {
     {Constellation::kGlonass, 38, 68, 1}, {Constellation::kSbas, 120, 158, 120}, {Constellation::kGalileo, 1, 36, 1},
     {Constellation::kBeidou, 1, 63, 1},   {Constellation::kQzss, 193, 202, 1},   {Constellation::kNavic, 1, 14, 1},
 };
-
-std::optional<SatelliteId> in(const Range& range, int number) {
-  if (number < range.first || number > range.last) return std::nullopt;
-  return SatelliteId{range.constellation, range.first_svid + number - range.first};
-}
-
-template <std::size_t N>
-std::optional<SatelliteId> in_any(const Range (&ranges)[N], int number) {
-  for (const Range& range : ranges) {
-    if (const auto id = in(range, number)) return id;
-  }
-  return std::nullopt;
-}
 
 }  // namespace
 
 std::optional<SatelliteId> satellite_of_gpsd(int number) { return nmea_satellite_id(Constellation::kUnknown, number); }
 
-std::optional<SatelliteId> satellite_of_ublox_svinfo(int number) { return in_any(kUbloxSvinfo, number); }
+std::optional<SatelliteId> satellite_of_ublox_svinfo(int number) { return id_in(kUbloxSvinfo, number); }
 
-std::optional<SatelliteId> satellite_of_septentrio(int number) { return in_any(kSeptentrio, number); }
+std::optional<SatelliteId> satellite_of_septentrio(int number) { return id_in(kSeptentrio, number); }
 
 std::optional<SatelliteId> satellite_of_novatel(int prn, std::uint32_t tracking_status) {
-  constexpr std::uint32_t kSystems = sizeof(kNovatelBySystem) / sizeof(Range);
+  constexpr std::uint32_t kSystems = sizeof(kNovatelBySystem) / sizeof(SatelliteNumberRange);
   const std::uint32_t system = (tracking_status >> 16U) & 7U;  // 0 GPS, then as in kNovatelBySystem
-  if (system == 0) return in_any(kNovatelByNumber, prn);
-  return system <= kSystems ? in(kNovatelBySystem[system - 1], prn) : std::nullopt;
+  if (system == 0) return id_in(kNovatelByNumber, prn);
+  return system <= kSystems ? kNovatelBySystem[system - 1].id_of(prn) : std::nullopt;
 }
 
 }  // namespace urban_gnss

@@ -57,8 +57,6 @@ LocalizerNode::LocalizerNode(ros::NodeHandle& node, ros::NodeHandle& private_nod
       node.advertiseService("fromLLArray", &Self::convert<FromLLArray::Request, FromLLArray::Response>, this));
   services_.push_back(private_node.advertiseService("reset", &Self::reset, this));
 
-  tf_listener_ = std::make_unique<tf2_ros::TransformListener>(tf_buffer_);
-
   diagnostics_.setHardwareID("none");
   diagnostics_.add("localization", this, &Self::diagnose);
   second_timer_ = node.createWallTimer(ros::WallDuration(1.0), [this](const ros::WallTimerEvent&) { every_second(); });
@@ -218,7 +216,7 @@ void LocalizerNode::publish_status() {
 }
 
 void LocalizerNode::look_up_sensors() {
-  if (tf_listener_ && !sensor_frames_.is_complete()) sensor_frames_.look_up(tf_buffer_, pipeline_);
+  if (!sensor_frames_.is_complete()) sensor_frames_.look_up(tf_buffer_, pipeline_);
   log_.log(sensor_frames_.take_events());
 }
 

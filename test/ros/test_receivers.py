@@ -91,7 +91,6 @@ class ReceiversTest(unittest.TestCase):
             velocity.header.stamp = stamp(second, 211571)
             velocities.publish(velocity)
             self.assertTrue(listener.wait(second + 1, second + 1, 0))
-            rospy.sleep(0.1)
         sky = [navsat["NavSAT_SV"](gnssId=0, svId=5, cno=25, elev=13, azim=60, prRes=179, flags=6428),
                navsat["NavSAT_SV"](gnssId=6, svId=255, cno=38, elev=-91, azim=0, prRes=0, flags=7),
                navsat["NavSAT_SV"](gnssId=0, svId=4, cno=40, elev=-91, azim=0, prRes=0, flags=2087)]

@@ -34,34 +34,6 @@ inline Sky with_ranges(Sky sky, const Eigen::Vector3d& place, const std::map<Con
   return sky;
 }
 
-/// What a receiver reports: the residuals at its own solution, by least squares with these weights, of ranges whose
-/// residuals at the true place are those of `sky`. Also where that solution is (m, east and north of the true place).
-template <class Weight>
-std::pair<Sky, Eigen::Vector2d> at_solution(Sky sky, const Weight& weight) {
-  std::map<Constellation, Eigen::Index> clocks;
-  for (const auto& s : sky) clocks.emplace(s.id.constellation, 3 + static_cast<Eigen::Index>(clocks.size()));
-  const auto rows = static_cast<Eigen::Index>(sky.size());
-  Eigen::MatrixXd h = Eigen::MatrixXd::Zero(rows, 3 + static_cast<Eigen::Index>(clocks.size()));
-  Eigen::VectorXd residuals(rows);
-  Eigen::VectorXd weights(rows);
-  for (Eigen::Index i = 0; i < rows; ++i) {
-    const SatelliteObservation& s = sky[static_cast<std::size_t>(i)];
-    h.row(i).head<3>() = range_gradient(s.look);
-    h(i, clocks.at(s.id.constellation)) = 1.0;
-    residuals[i] = s.residual_m;
-    weights[i] = weight(s);
-  }
-  const Eigen::MatrixXd weighted = weights.asDiagonal() * h;
-  const Eigen::VectorXd solution = (h.transpose() * weighted).ldlt().solve(weighted.transpose() * residuals);
-  residuals -= h * solution;
-  for (Eigen::Index i = 0; i < rows; ++i) sky[static_cast<std::size_t>(i)].residual_m = residuals[i];
-  return {sky, solution.head<2>()};
-}
-
-inline Sky at_solution(const Sky& sky) {
-  return at_solution(sky, [](const SatelliteObservation&) { return 1.0; }).first;
-}
-
 inline Sky two_constellations() {
   Sky sky = open_sky();
   for (const auto& [azimuth, elevation] : {std::pair{30, 35}, {120, 65}, {200, 22}, {255, 33}, {330, 55}}) {
@@ -133,6 +105,25 @@ struct DenseRanges {
     return result;
   }
 };
+
+/// What a receiver reports: the residuals at its own solution, by least squares with these weights, of ranges whose
+/// residuals at the true place are those of `sky`. Also where that solution is (m, east and north of the true place).
+template <class Weight>
+std::pair<Sky, Eigen::Vector2d> at_solution(Sky sky, const Weight& weight) {
+  const DenseRanges ranges(sky);
+  Eigen::VectorXd weights(ranges.h.rows());
+  for (Eigen::Index i = 0; i < weights.size(); ++i) weights[i] = weight(sky[static_cast<std::size_t>(i)]);
+  const Eigen::MatrixXd weighted = weights.asDiagonal() * ranges.h;
+  const Eigen::VectorXd solution =
+      (ranges.h.transpose() * weighted).ldlt().solve(weighted.transpose() * ranges.residuals);
+  const Eigen::VectorXd left = ranges.residuals - ranges.h * solution;
+  for (Eigen::Index i = 0; i < left.size(); ++i) sky[static_cast<std::size_t>(i)].residual_m = left[i];
+  return {sky, solution.head<2>()};
+}
+
+inline Sky at_solution(const Sky& sky) {
+  return at_solution(sky, [](const SatelliteObservation&) { return 1.0; }).first;
+}
 
 /// What range_fix() believes where ranges say nothing.
 inline RelativePlace anywhere() { return {Eigen::Vector2d::Zero(), isotropic(100.0)}; }

@@ -41,6 +41,7 @@ class ResidualCheck {
   void add(const std::vector<SatelliteObservation>& satellites);
   /// True as long as nothing speaks against it.
   bool belong() const;
+  void reset() { *this = ResidualCheck(parameters_); }
 
  private:
   ResidualCheckParameters parameters_;

@@ -19,8 +19,8 @@ class RateLagSearch {
   /// The rate of the IMU at a stamp of its own clock, rad/s; nothing where it is not known.
   using RateAt = std::function<std::optional<double>(Stamp)>;
 
-  /// A rate of the odometry (rad/s); stamps ascend.
-  void add(Stamp stamp, double odometry_radps, const RateAt& imu_at);
+  /// A rate of the odometry (rad/s); stamps ascend. Whether it adds to what lead_s() knows.
+  bool add(Stamp stamp, double odometry_radps, const RateAt& imu_at);
   /// s by which the IMU's stamps are ahead; nothing until it is clear that they are off.
   std::optional<double> lead_s() const;
 

@@ -12,6 +12,9 @@ struct UtcTime {
   std::int64_t nanosecond{0};
 };
 
+/// Days since 1970-01-01 of a day of the Gregorian calendar. Nothing is checked; month 13 is the next January.
+std::int64_t days_from_civil(std::int64_t year, std::int64_t month, std::int64_t day);
+
 /// Since 1970-01-01, without leap seconds, as ROS counts.
 Stamp to_stamp(const UtcTime& time);
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -37,6 +38,10 @@ bool is_type_of(const ReceiverTopic& topic, const std::string& type);
 
 /// `ns`/name; the name alone where the namespace is empty, from the root where it is "/".
 std::string full_name(const std::string& ns, const ReceiverTopic& topic);
+
+/// The other way round: the namespace of a topic whose full name (without its leading slash) ends with the driver's,
+/// "/" for the root; nothing where it ends otherwise.
+std::optional<std::string> namespace_of(const std::string& full, const ReceiverTopic& topic);
 
 /// Why a topic of this name must not be taken for a receiver's; empty where it may. mavros' `global_position/global`
 /// and `local` are the autopilot's own estimate, of which a filter must not make a second one.

@@ -116,7 +116,7 @@ class LocalizerNode {
   InputWatch fix_watch_;
   tf2_ros::TransformBroadcaster broadcaster_;
   tf2_ros::Buffer tf_buffer_;
-  std::unique_ptr<tf2_ros::TransformListener> tf_listener_;
+  tf2_ros::TransformListener tf_listener_{tf_buffer_};
   diagnostic_updater::Updater diagnostics_;
   ros::WallTimer second_timer_;
   ros::WallTimer five_second_timer_;

@@ -19,14 +19,6 @@ using urban_gnss_localization::SatelliteArray;
 /// The topics of a receiver in a bag, by their full names.
 using TopicsInBag = std::map<std::string, const ReceiverTopic*>;
 
-/// The namespace of a topic that ends with the driver's name for it; nothing where it does not.
-std::optional<std::string> namespace_of(const std::string& full, const std::string& name) {
-  if (full == name) return "/";
-  const std::string end = "/" + name;
-  if (full.size() <= end.size() || full.compare(full.size() - end.size(), end.size(), end) != 0) return std::nullopt;
-  return full.substr(0, full.size() - end.size());
-}
-
 /// All receivers of the preset's kind in the bag, by their namespaces.
 std::map<std::string, TopicsInBag> find_receivers(const rosbag::Bag& bag, const ReceiverPreset& preset) {
   std::map<std::string, TopicsInBag> receivers;
@@ -34,7 +26,7 @@ std::map<std::string, TopicsInBag> find_receivers(const rosbag::Bag& bag, const 
   for (const rosbag::ConnectionInfo* connection : all.getConnections()) {
     const std::string full = without_leading_slash(connection->topic);
     for (const ReceiverTopic& topic : preset.topics) {
-      const auto ns = namespace_of(full, topic.name);
+      const auto ns = namespace_of(full, topic);
       if (ns && is_type_of(topic, connection->datatype)) receivers[*ns][full] = &topic;
     }
   }
@@ -65,15 +57,6 @@ TopicsInBag find_receiver(const rosbag::Bag& bag, const ReceiverPreset& preset, 
                            topics_of(bag));
 }
 
-void add_message(const rosbag::MessageInstance& message, const ReceiverTopic& topic, ReceiverInput& input) {
-  std::vector<std::uint8_t> bytes(message.size());
-  ros::serialization::OStream stream(bytes.data(), static_cast<std::uint32_t>(bytes.size()));
-  message.write(stream);
-  const MessageConnection connection{message.getTopic(), message.getDataType(), message.getMD5Sum(),
-                                     message.getMessageDefinition()};
-  input.add(topic, connection, bytes.data(), bytes.size(), to_stamp(message.getTime()));
-}
-
 }  // namespace
 
 ReceiverRecording decode_receiver(const rosbag::Bag& bag, const ReplayOptions& options) {
@@ -97,7 +80,8 @@ ReceiverRecording decode_receiver(const rosbag::Bag& bag, const ReplayOptions& o
   };
   for (const rosbag::MessageInstance& message : ordered_messages(bag, names)) {
     last = to_stamp(message.getTime());
-    add_message(message, *topics.at(without_leading_slash(message.getTopic())), input);
+    const ReceiverTopic& topic = *topics.at(without_leading_slash(message.getTopic()));
+    add_message(message, message.getTopic(), topic, last, input);
     take();
   }
   input.finish();

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <iostream>
+#include <memory>
 #include <stdexcept>
 #include <string>
 
@@ -135,7 +136,8 @@ void ReplayInputs::read_receiver(const ReplayOptions& options) {
 }
 
 void ReplayInputs::read_topics(const ReplayOptions& options) {
-  const Topics names(options);
+  const auto shared_names = std::make_shared<const Topics>(options);  // one for all messages
+  const Topics& names = *shared_names;
   std::vector<std::string> wanted = names.ordered();
   const auto leave_out = [&](const std::string& name) {
     wanted.erase(std::remove(wanted.begin(), wanted.end(), name), wanted.end());
@@ -153,8 +155,8 @@ void ReplayInputs::read_topics(const ReplayOptions& options) {
   for (const rosbag::MessageInstance& message : messages) {
     const std::string topic = without_leading_slash(message.getTopic());
     const bool is_latched = topic == topics::kDatum || topic == topics::kStaticTf;
-    inputs_.push_back(
-        {to_stamp(message.getTime()), [message, names](ReplayRun& run) { give(message, names, run); }, is_latched});
+    inputs_.push_back({to_stamp(message.getTime()),
+                       [message, shared_names](ReplayRun& run) { give(message, *shared_names, run); }, is_latched});
   }
 }
 
