@@ -121,10 +121,12 @@ void OcclusionNode::on_fix(const sensor_msgs::NavSatFixConstPtr& message) {
   }
   fixes_.push_back(message);
   newest_ = std::max(newest_, message->header.stamp);
+  forget_former_clock();
   work();
 }
 
 void OcclusionNode::start_anew() {
+  former_newest_ = newest_;
   pipeline_->reset();
   prior_is_in_ = false;
   clouds_.clear();
@@ -132,6 +134,17 @@ void OcclusionNode::start_anew() {
   tf_buffer_.clear();
   newest_ = ros::Time();
   yaw_sigma_ = 0.0;
+}
+
+/// A transform from before the clock was set back may come after tf_buffer_ was cleared, by another connection or tf's
+/// own thread. tf ignores all that is older than it: then the buffer is cleared again.
+void OcclusionNode::forget_former_clock() {
+  if (former_newest_ <= newest_) return;  // none, or caught up with
+  const ros::Time midway = newest_ + (former_newest_ - newest_) * 0.5;
+  for (const auto& [to, from] : {std::pair(frames_.odom, frames_.base_link), std::pair(frames_.map, frames_.odom)}) {
+    const auto latest = look_up(to, from, ros::Time(0));
+    if (latest && latest->header.stamp > midway) tf_buffer_.clear();
+  }
 }
 
 /// Whether what has this stamp need not wait for its transform any longer. By stamps, so that a bag that is played

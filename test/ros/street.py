@@ -116,6 +116,11 @@ class Street:
                                         for store in stores.values()), "the fix at %d" % due)
         return stamps[:-lag]
 
+    def transform_of(self, later_s):
+        """A transform alone, with a stamp that many seconds after the last epoch's."""
+        stamp = rospy.Time.from_sec(self.time_s + later_s)
+        self.publishers["tf"].publish(TFMessage([to_transform(stamp, "odom", "base_link")]))
+
     def burst(self, clouds, points):
         """Clouds of one moment, without anything else."""
         for i in range(clouds):

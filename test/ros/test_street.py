@@ -240,6 +240,9 @@ class StreetTest(unittest.TestCase):
             self.assertIn("clouds", self.street.visibilities[node][newest].missing)
         self.wait_for_log("/occlusion", "the clock was set back by")
         self.feed_complete()
+        self.street.transform_of(500.0)  # of the former clock, late: tf then ignores all that is older
+        self.feed(20, cloud=WALL, lag=5)
+        self.feed_complete()
         again = self.feed(cloud=WALL)
         for node in (NODE, NODELET):
             blocked = {svid for svid, s in by_svid(again[node]).items() if s.blocked_fraction > 0.99}

@@ -83,6 +83,7 @@ class OcclusionNode {
   void on_estimate(const nav_msgs::Odometry& message);
   void on_fix(const sensor_msgs::NavSatFixConstPtr& message);
   void start_anew();
+  void forget_former_clock();
 
   bool is_overdue(const ros::Time& stamp) const;
   void work();
@@ -110,6 +111,7 @@ class OcclusionNode {
   std::deque<sensor_msgs::PointCloud2ConstPtr> clouds_;
   std::deque<sensor_msgs::NavSatFixConstPtr> fixes_;
   ros::Time newest_;  ///< stamp of the fixes: one of the future is a set-back clock at the next, a cloud's would stay
+  ros::Time former_newest_;  ///< that of before the clock was set back
   double yaw_sigma_{0.0};  ///< NaN where the localizer does not know the heading
   bool antenna_known_{false};
   InputWatch fix_watch_;
