@@ -1,8 +1,5 @@
 #include <diagnostic_updater/diagnostic_updater.h>
-#include <geometry_msgs/TwistWithCovarianceStamped.h>
 #include <ros/ros.h>
-#include <sensor_msgs/NavSatFix.h>
-#include <urban_gnss_localization/SatelliteArray.h>
 
 #include <atomic>
 #include <mutex>
@@ -11,9 +8,8 @@
 #include "urban_gnss_localization/ros/conversions.hpp"
 #include "urban_gnss_localization/ros/gpsd_node_parameters.hpp"
 #include "urban_gnss_localization/ros/node_parameters.hpp"
-#include "urban_gnss_localization/ros/receiver_messages.hpp"
+#include "urban_gnss_localization/ros/receiver_publishers.hpp"
 #include "urban_gnss_localization/ros/tcp_lines.hpp"
-#include "urban_gnss_localization/ros/topics.hpp"
 
 namespace urban_gnss {
 namespace {
@@ -22,10 +18,10 @@ namespace {
 class GpsdNode {
  public:
   GpsdNode(ros::NodeHandle& node, ros::NodeHandle& private_node)
-      : parameters_(read(private_node)), decoder_(parameters_.gpsd), diagnostics_(ros::NodeHandle(), private_node) {
-    fix_publisher_ = node.advertise<sensor_msgs::NavSatFix>(topics::kFix, 100);
-    velocity_publisher_ = node.advertise<geometry_msgs::TwistWithCovarianceStamped>(topics::kVelocity, 100);
-    satellites_publisher_ = node.advertise<urban_gnss_localization::SatelliteArray>(topics::kSatellites, 100);
+      : parameters_(read(private_node)),
+        decoder_(parameters_.gpsd),
+        publishers_(node),
+        diagnostics_(ros::NodeHandle(), private_node) {
     diagnostics_.setHardwareID(server());
     diagnostics_.add("gpsd", this, &GpsdNode::diagnose);
     second_timer_ = node.createWallTimer(ros::WallDuration(1.0),
@@ -58,6 +54,7 @@ class GpsdNode {
       publish(decoder_.take());
       if (!lines_.is_open()) {
         is_connected_ = false;
+        decoder_.reset();
         ROS_WARN_STREAM("gpsd at " << server() << " has ended the connection; trying again every "
                                    << parameters_.reconnect_period << " s");
       }
@@ -76,7 +73,6 @@ class GpsdNode {
     }
     lines_.send("?WATCH={\"enable\":true,\"json\":true}\n");
     const std::lock_guard<std::mutex> lock(mutex_);
-    decoder_.reset();
     is_connected_ = true;
     ++connections_;
     ROS_INFO_STREAM("connected to gpsd at " << server());
@@ -84,19 +80,9 @@ class GpsdNode {
   }
 
   void publish(const ReceiverOutput& output) {
-    for (const std::string& warning : output.warnings) ROS_WARN_STREAM(warning);
-    for (const RawFix& fix : output.fixes) {
-      fix_publisher_.publish(to_message(fix, parameters_.frame));
-      ++(fix.has_fix ? fixes_ : without_fix_);
-      last_ = ros::WallTime::now();
-    }
-    for (const RawVelocity& velocity : output.velocities) {
-      velocity_publisher_.publish(to_message(velocity, parameters_.frame));
-    }
-    for (const SatelliteEpoch& epoch : output.satellites) {
-      satellites_publisher_.publish(to_message(epoch, parameters_.frame));
-      ++lists_;
-    }
+    publishers_.publish(output, parameters_.frame);
+    counter_.add(output);
+    if (!output.fixes.empty()) last_ = ros::WallTime::now();
   }
 
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
@@ -109,7 +95,7 @@ class GpsdNode {
       status.summary(DiagnosticStatus::WARN, "gpsd reports no solutions: has it a device? (gpsd -n, cgps)");
     } else if (decoder_.mode() < 2) {
       status.summary(DiagnosticStatus::WARN, "the receiver has no fix");
-    } else if (lists_ == 0) {
+    } else if (counter_.counts().epochs == 0) {
       status.summary(DiagnosticStatus::WARN, "fixes without satellites (GSV of NMEA, NAV-SAT of u-blox are off?)");
     } else {
       status.summary(DiagnosticStatus::OK, "fixes with satellites");
@@ -119,9 +105,7 @@ class GpsdNode {
     status.add("device", decoder_.device());
     status.add("mode", decoder_.mode());
     status.add("connections", connections_);
-    status.add("fixes", fixes_);
-    status.add("solutions without a fix", without_fix_);
-    status.add("lists of satellites", lists_);
+    add_counts(counter_.counts(), status);
   }
 
   const GpsdNodeParameters parameters_;
@@ -130,14 +114,10 @@ class GpsdNode {
   GpsdDecoder decoder_;
   bool is_connected_{false};
   std::size_t connections_{0};
-  std::size_t fixes_{0};
-  std::size_t without_fix_{0};
-  std::size_t lists_{0};
+  ReceiverCounter counter_;
   ros::WallTime last_;
 
-  ros::Publisher fix_publisher_;
-  ros::Publisher velocity_publisher_;
-  ros::Publisher satellites_publisher_;
+  ReceiverPublishers publishers_;
   diagnostic_updater::Updater diagnostics_;
   ros::WallTimer second_timer_;
   std::atomic<bool> is_stopped_{false};

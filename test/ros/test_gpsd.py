@@ -6,6 +6,7 @@ import json
 import math
 import os
 import subprocess
+import sys
 import tempfile
 import time
 import unittest
@@ -17,19 +18,15 @@ from geometry_msgs.msg import TwistWithCovarianceStamped
 from sensor_msgs.msg import NavSatFix
 from urban_gnss_localization.msg import Satellite, SatelliteArray
 
+sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
+import driver_messages as driver  # noqa: E402
+
 RECORDED = os.path.join(os.environ.get("URBAN_GNSS_DATA", ""), "nmea", "gpsd_ublox-zed-f9p-nmea.log")
 START = 1581076800  # 2020-02-07 12:00:00 UTC
 EPOCHS = 40         # at 1 Hz
 KNOT = 1852.0 / 3600.0
 WAIT = 60.0         # s
 GALILEO, GLONASS = Satellite.GALILEO, Satellite.GLONASS
-
-
-def sentence(body):
-    checksum = 0
-    for character in body:
-        checksum ^= ord(character)
-    return "$%s*%02X\r\n" % (body, checksum)
 
 
 def latitude(k):
@@ -45,7 +42,7 @@ def epoch(k):
     clock = time.strftime("%H%M%S.00", time.gmtime(START + k))
     place = "48%09.6f,N,01134.500000,E" % (60.0 * (latitude(k) - 48.0))
     cn0 = satellites(k)
-    return "".join(sentence(body) for body in (
+    return "".join(driver.with_checksum(body) for body in (
         "GNRMC,%s,A,%s,3.600,90.00,070220,,,A" % (clock, place),
         "GNGGA,%s,%s,1,08,1.00,500.0,M,47.0,M,," % (clock, place),
         "GNGSA,A,3,05,12,,,,,,,,,,,2.0,1.0,1.7",
