@@ -16,6 +16,12 @@ namespace {
 
 constexpr Stamp kHealthInterval = std::chrono::milliseconds(100);
 
+/// The bias filter is as printed where the localizer is.
+GpsBiasParameters bias_of(GpsBiasParameters bias, const Localizer& localizer) {
+  if (localizer.mode() == enum_name(ParticleFilterMode::kLiteral)) bias.mode = ParticleFilterMode::kLiteral;
+  return bias;
+}
+
 /// A contender's localizer with its pipelines.
 class Participant : public LocalizingParticipant {
  public:
@@ -23,7 +29,7 @@ class Participant : public LocalizingParticipant {
               Trajectory& estimate, std::vector<HealthSample>& health)
       : frame_(scenario.datum),
         localization_(conditions.localization, contender.make()),
-        bias_responder_(conditions.bias),
+        bias_responder_(bias_of(conditions.bias, localization_.localizer())),
         antenna_(scenario.vehicle.antenna()),
         estimate_(estimate),
         health_(health) {

@@ -141,8 +141,7 @@ const std::vector<PaperMethod>& paper_methods() {
       {"literal", Kind::kFilter, "proposed filter, the text as printed",
        [](auto& c) {
          c.filter.mode = ParticleFilterMode::kLiteral;
-         c.bias.bias_input = BiasInput::kPosition;
-         c.bias.bias_acceleration_density = 0.0;
+         c.bias.mode = ParticleFilterMode::kLiteral;
        }},
       {"paper", Kind::kFilter, "proposed filter, the reading that works",
        [](auto& c) { c.filter.mode = ParticleFilterMode::kPaper; }},

@@ -47,7 +47,7 @@ class GpsBiasNode {
   BiasPipelineParameters read(const ros::NodeHandle& private_node) {
     GpsBiasNodeParameters parameters;
     if (private_node.getParam("localizer", parameters.localizer) && !parameters.localizer.empty()) {
-      read_known_parameters(ros::NodeHandle(parameters.localizer), parameters.frames, parameters.bias.input);
+      read_known_parameters(ros::NodeHandle(parameters.localizer), parameters.frames, parameters.bias);
     }
     read_private_parameters(private_node, parameters);
     frames_ = parameters.frames;

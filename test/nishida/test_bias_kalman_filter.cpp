@@ -156,6 +156,35 @@ TEST(BiasTracker, RadiusIsTheLengthOfTheResidualOrAsPrintedOfThePosition) {
   }
 }
 
+// Eq. (14) to (21), typed out from the text, with C in (19) in place of the printed transpose, which does not multiply.
+TEST(BiasTracker, LiteralIsThePrintedFilter) {
+  GpsBiasParameters parameters = with(GpsBiasParameters{}, "mode: literal");
+  parameters.shadow_sigma = 2.0;
+  BiasTracker tracker(parameters);
+  Eigen::Vector4d eta(100.0, 0.0, 50.0, 0.0);
+  Eigen::Matrix4d p = Eigen::Vector4d(4.0, 9.0, 4.0, 9.0).asDiagonal();  // nothing is printed: sigma_s, 3 m/s
+  Eigen::Matrix4d a = Eigen::Matrix4d::Identity();
+  a(0, 1) = a(2, 3) = 0.2;
+  Eigen::Matrix<double, 2, 4> c = Eigen::Matrix<double, 2, 4>::Zero();
+  c(0, 0) = c(1, 2) = 1.0;
+  for (int k = 0; k < 200; ++k) {
+    // No gate: from the 100th on a kilometre aside. Where the antenna is said to be does not matter.
+    const Eigen::Vector2d z(100.0 + 0.5 * k + (k < 100 ? 0.0 : 1000.0), 50.0 - 0.1 * k);
+    const BiasEstimate& estimate = tracker.process(fix_at(0.2 * k, z), {3.0 * k, -7.0});
+    if (k > 0) {
+      eta = a * eta;
+      p = a * p * a.transpose();
+    }
+    const Eigen::Matrix2d s = c * p * c.transpose() + 4.0 * Eigen::Matrix2d::Identity();
+    const Eigen::Matrix<double, 4, 2> gain = p * c.transpose() * s.inverse();
+    eta += gain * (z - c * eta);
+    p = (Eigen::Matrix4d::Identity() - gain * c) * p;
+    ASSERT_FALSE(is_rejected(estimate.outcome.decision)) << k;
+    ASSERT_NEAR(estimate.radius_m, std::hypot(eta(0), eta(2)), 1e-6) << k;
+    ASSERT_NEAR(estimate.bias.x(), eta(0), 1e-6) << k;
+  }
+}
+
 TEST(BiasTracker, ShadowIsSetWhileTheBiasIsSignificant) {
   RandomEngine engine = make_engine(3);
   GpsBiasParameters parameters;
@@ -256,8 +285,8 @@ TEST(BiasTracker, EveryParameterHasAnEffect) {
     return values;
   };
   const std::vector<std::string> changes = {
-      "bias_input: position",  "shadow_sigma: 2.0", "bias_acceleration_density: 0.5", "bias_rate_sigma: 1.0",
-      "gate_probability: 0.5", "gate_timeout: 2.0", "shadow_probability: 0.9"};
+      "mode: literal",        "bias_input: position",  "shadow_sigma: 2.0", "bias_acceleration_density: 0.5",
+      "bias_rate_sigma: 1.0", "gate_probability: 0.5", "gate_timeout: 2.0", "shadow_probability: 0.9"};
   for (const std::string& change : changes) EXPECT_NE(trace(with(GpsBiasParameters{}, change)), trace({})) << change;
   EXPECT_EQ(changes.size(), parameter_names(GpsBiasParameters{}).size());
 }

@@ -1,6 +1,8 @@
 #include <gtest/gtest.h>
 
+#include <Eigen/Dense>
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -22,6 +24,41 @@ FixLikelihood example(LikelihoodForm form) {
   fix.radius = 3.5;
   fix.fix_heading = 3.0;
   return fix;
+}
+
+/// Eq. (27) to (33) without logarithms: the oracle of the form that the filter uses.
+double plain_log_likelihood(const Pose2& pose, const FixLikelihood& fix) {
+  const auto density = [](double deviation, double sigma) {
+    return std::exp(-0.5 * deviation * deviation / (sigma * sigma)) / std::sqrt(2.0 * kPi * sigma * sigma);
+  };
+  const Eigen::Vector2d d = transform_point(pose, fix.antenna_in_body) - fix.fix;
+  const double d_heading = angle_difference(pose.yaw, fix.fix_heading);
+  const double d_ring = d.norm() - fix.radius;
+  const double heading = density(d_heading, fix.heading_sigma);
+  double direct = 0.0;
+  double shadow = 0.0;
+  if (fix.form == LikelihoodForm::kProduct) {
+    direct = std::exp(-0.5 * d.dot(fix.direct_covariance.inverse() * d)) /
+             (2.0 * kPi * std::sqrt(fix.direct_covariance.determinant()));
+    shadow = density(d_ring, fix.shadow_sigma) / (2.0 * kPi * std::max(fix.radius, fix.shadow_sigma));
+    if (fix.with_heading) {
+      direct *= heading;
+      shadow *= heading;
+    }
+  } else {
+    // 1/(2 pi sigma^2) is the one-dimensional normaliser squared.
+    const auto term = [&](double deviation, double sigma) {
+      const double extra = fix.form == LikelihoodForm::kPrinted ? 1.0 / std::sqrt(2.0 * kPi * sigma * sigma) : 1.0;
+      return density(deviation, sigma) * extra;
+    };
+    const double heading_term = fix.with_heading ? term(d_heading, fix.heading_sigma) / 3.0 : 0.0;
+    direct = 2.0 / 3.0 *
+                 (term(d.x(), std::sqrt(fix.direct_covariance(0, 0))) +
+                  term(d.y(), std::sqrt(fix.direct_covariance(1, 1)))) +
+             heading_term;
+    shadow = 2.0 / 3.0 * term(d_ring, fix.shadow_sigma) + heading_term;
+  }
+  return std::log(fix.with_shadow ? 0.5 * direct + 0.5 * shadow : direct);
 }
 
 double weighed(const Pose2& pose, const FixLikelihood& fix) {
@@ -47,8 +84,9 @@ TEST(FixLikelihood, ArrayFormIsThePlainFormForAllForms) {
       weigh(particles, fix);
       for (std::size_t i = 0; i < particles.size(); ++i) {
         // Logarithms of sums of exponentials of up to some hundreds: 1e-12 is a few roundings of those.
-        ASSERT_NEAR(particles.log_weight[i] - before.log_weight[i], log_likelihood(before.pose(i), fix), 1e-11)
-            << enum_name(form) << ' ' << flags;
+        const double expected = plain_log_likelihood(before.pose(i), fix);
+        ASSERT_NEAR(particles.log_weight[i] - before.log_weight[i], expected, 1e-11) << enum_name(form) << ' ' << flags;
+        ASSERT_NEAR(log_likelihood(before.pose(i), fix), expected, 1e-11) << enum_name(form) << ' ' << flags;
       }
     }
   }

@@ -85,6 +85,91 @@ TEST(ParticleFilter, ModesMeanWhatTheySay) {
   EXPECT_FALSE(ParticleFilter(small("mode: conventional"), {}).wants_bias());
   EXPECT_TRUE(ParticleFilter(small("mode: paper"), {}).wants_bias());
   EXPECT_EQ(ParticleFilter(small("mode: literal"), {}).mode(), "literal");
+  const auto averages = [](const std::string& yaml) { return with(ParticleFilterParameters{}, yaml).averages_all(); };
+  EXPECT_TRUE(averages("mode: literal"));
+  EXPECT_TRUE(averages("mode: conventional"));
+  EXPECT_FALSE(averages("mode: paper"));
+  EXPECT_TRUE(averages("{mode: paper, estimate: mean}"));
+  EXPECT_FALSE(averages("{mode: literal, estimate: heaviest_cluster}"));
+  const auto printed = [](const std::string& yaml) { return with(ParticleFilterParameters{}, yaml).is_as_printed(); };
+  EXPECT_TRUE(printed("mode: literal"));
+  EXPECT_TRUE(printed("mode: conventional"));
+  EXPECT_FALSE(printed("{mode: conventional, likelihood: product}"));
+  EXPECT_FALSE(printed("{mode: paper, likelihood: printed}"));
+}
+
+/// Eq. (27) to (33), or (47) without a radius, typed out from the text.
+double printed_likelihood(const Pose2& p, const Eigen::Vector2d& fix, double fix_heading, double radius, double sb,
+                          double ss, double sp, bool with_shadow) {
+  const auto term = [](double d, double sigma) {
+    return std::exp(-d * d / (2.0 * sigma * sigma)) / (2.0 * M_PI * sigma * sigma);
+  };
+  const double heading = std::remainder(p.yaw - fix_heading, 2.0 * M_PI);
+  const double direct = 2.0 / 3.0 * (term(p.x - fix.x(), sb) + term(p.y - fix.y(), sb)) + 1.0 / 3.0 * term(heading, sp);
+  const double shadow = 2.0 / 3.0 * term((p.position() - fix).norm() - radius, ss) + 1.0 / 3.0 * term(heading, sp);
+  return with_shadow ? 0.5 * direct + 0.5 * shadow : direct;
+}
+
+// Lines 5 to 9 of Algorithm 1 from the text: the defaults of a robot, with a mode alone.
+TEST(ParticleFilter, LiteralAndConventionalAreAlgorithm1AsPrinted) {
+  for (const char* mode : {"mode: literal", "mode: conventional"}) {
+    ParticleFilterParameters parameters = small(mode);
+    parameters.ring_share = 0.0;  // whose draws a test of the ring examines
+    MotionParameters motion;
+    motion.odom_noise_scale = 0.0;
+    ParticleFilter filter(parameters, motion);
+    filter.initialize(pose_with_sigma({3.0, 4.0, 0.8}, 2.0, 0.3));
+    ParticleSet expected = filter.particles();
+    Eigen::Vector2d last = filter.pose().position();
+    for (int k = 1; k <= 3; ++k) {
+      filter.move(kTwist, kStep_s);
+      const Eigen::Vector2d fix(3.0 + 0.4 * k, 4.3);
+      const double radius = 1.5 * k;
+      // A fix that claims to be far better, or farther off than a gate would let pass, changes nothing.
+      filter.correct(fix_at(k * kStep_s, fix, k == 2 ? 0.01 : 100.0, radius));
+      const double fix_heading = std::atan2(fix.y() - last.y(), fix.x() - last.x()) + kTwist.yaw_rate_radps * kStep_s;
+      double sum = 0.0;
+      for (std::size_t i = 0; i < expected.size(); ++i) {
+        const Pose2 moved = move(expected.pose(i), kTwist, kStep_s);
+        expected.x[i] = moved.x;
+        expected.y[i] = moved.y;
+        expected.yaw[i] = moved.yaw;
+        expected.weight[i] *= printed_likelihood(moved, fix, fix_heading, radius, 3.0, 3.0, 0.1, filter.wants_bias());
+        sum += expected.weight[i];
+      }
+      Pose2 mean;
+      double squares = 0.0;
+      for (std::size_t i = 0; i < expected.size(); ++i) {
+        const double w = expected.weight[i] /= sum;
+        mean.x += w * expected.x[i];
+        mean.y += w * expected.y[i];
+        mean.yaw += w * expected.yaw[i];  // none is near +-pi
+        squares += w * w;
+      }
+      EXPECT_TRUE(near(filter.pose(), mean, 1e-9)) << mode << ' ' << k;
+      EXPECT_NEAR(filter.effective_sample_size(), 1.0 / squares, 1e-6) << mode << ' ' << k;
+      last = mean.position();
+    }
+    EXPECT_GT(filter.effective_sample_size(), 5.0);  // or it was drawn anew
+  }
+}
+
+TEST(ParticleFilter, AsPrintedHasNoGateAndNoDoubt) {
+  for (const char* mode : {"mode: literal", "mode: conventional"}) {
+    ParticleFilter filter(small(mode), {});
+    filter.initialize(pose_with_sigma({0.0, 0.0, 1.0}, 1.0, 0.1));
+    const std::vector<double> before = filter.particles().x;
+    filter.doubt({9.0, 1.0});
+    EXPECT_EQ(filter.particles().x, before) << mode;
+    for (int k = 1; k <= 10; ++k) {
+      EXPECT_FALSE(is_rejected(filter.correct(fix_at(k, {300.0, 400.0}, 2.0, 500.0)).decision)) << mode;
+    }
+  }
+  ParticleFilter paper(small("mode: paper"), {});
+  paper.initialize(pose_with_sigma({0.0, 0.0, 1.0}, 1.0, 0.1));
+  const std::vector<double> before = paper.particles().x;
+  paper.doubt({9.0, 1.0});
+  EXPECT_NE(paper.particles().x, before);
 }
 
 TEST(ParticleFilter, EveryParameterHasAnEffect) {

@@ -249,13 +249,24 @@ TEST(BiasPipeline, EveryParameterHasAnEffect) {
     for (const PipelineEvent& event : rig.pipeline.take_events()) out << event.text << '\n';
     return out.str();
   };
-  const std::map<std::string, std::string> changes = {
-      {"antenna_offset", "[1.0, 0.0]"}, {"estimate_timeout", "0.35"},    {"time_jump", "0.5"},
-      {"reset_on_time_jump", "false"},  {"fix_sigma_default", "7.0"},    {"fix_sigma_floor", "0.5"},
-      {"fix_sigma_ceiling", "100.0"},   {"fix_covariance_scale", "2.0"}, {"max_distance_from_datum", "1000.0"},
-      {"bias_input", "position"},       {"shadow_sigma", "2.0"},         {"bias_acceleration_density", "1.0"},
-      {"bias_rate_sigma", "1.0"},       {"gate_probability", "0.5"},     {"gate_timeout", "2.0"},
-      {"shadow_probability", "0.9"},    {"odometry_gap", "0.05"}};
+  const std::map<std::string, std::string> changes = {{"mode", "literal"},
+                                                      {"antenna_offset", "[1.0, 0.0]"},
+                                                      {"estimate_timeout", "0.35"},
+                                                      {"time_jump", "0.5"},
+                                                      {"reset_on_time_jump", "false"},
+                                                      {"fix_sigma_default", "7.0"},
+                                                      {"fix_sigma_floor", "0.5"},
+                                                      {"fix_sigma_ceiling", "100.0"},
+                                                      {"fix_covariance_scale", "2.0"},
+                                                      {"max_distance_from_datum", "1000.0"},
+                                                      {"bias_input", "position"},
+                                                      {"shadow_sigma", "2.0"},
+                                                      {"bias_acceleration_density", "1.0"},
+                                                      {"bias_rate_sigma", "1.0"},
+                                                      {"gate_probability", "0.5"},
+                                                      {"gate_timeout", "2.0"},
+                                                      {"shadow_probability", "0.9"},
+                                                      {"odometry_gap", "0.05"}};
   const std::string plain = trace("{}");
   for (const std::string& name : parameter_names(BiasPipelineParameters{})) {
     ASSERT_EQ(changes.count(name), 1u) << name << " is not examined";

@@ -144,6 +144,30 @@ class ToolTest(unittest.TestCase):
         first, other = (open(self.path(name)).readlines()[-1].split() for name in ("a.tum", "d.tum"))
         self.assertAlmostEqual(float(first[2]) - float(other[2]), 111.2, delta=5.0)
 
+    def test_replay_as_printed(self):
+        """The bias filter of `literal` runs on the fix itself: r-hat is then the distance from the datum."""
+        write_recording(self.directory)
+        self.succeed("csv_to_bag", self.directory, self.path("in.bag"))
+
+        def replay(name, *settings):
+            self.succeed("replay", self.path("in.bag"), *RANDOM, "--datum", "45,7,0", "--output", self.path(name),
+                         "--json", self.path("out.json"), *(part for each in settings for part in ("--set", each)))
+            with open(self.path("out.json")) as file:
+                decisions = json.load(file)["decisions"]
+            with rosbag.Bag(self.path(name)) as bag:
+                radii = {bias.header.stamp.to_sec(): bias.radius for _, bias, _ in bag.read_messages("/gps/bias")}
+            return radii, decisions
+
+        literal, decisions = replay("literal.bag", "mode=literal")
+        self.assertGreater(len(literal), 30)
+        self.assertGreater(max(literal.values()), 40.0)  # the circle reaches 60 m
+        self.assertEqual([name for name in decisions if name.startswith("rejected") and decisions[name]], [])
+        self.assertLess(max(replay("paper.bag", "mode=paper")[0].values()), 20.0)
+        self.assertLess(max(replay("other.bag", "mode=literal", "gps_bias.mode=paper")[0].values()), 40.0)
+        conventional, decisions = replay("conventional.bag", "mode=conventional")
+        self.assertEqual(conventional, {})
+        self.assertEqual([name for name in decisions if name.startswith("rejected") and decisions[name]], [])
+
     def test_part_of_a_bag(self):
         write_recording(self.directory)
         self.succeed("csv_to_bag", self.directory, self.path("in.bag"))

@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 import tempfile
+import threading
 import unittest
 
 import rosbag
@@ -13,7 +14,7 @@ import rospy
 import rostest
 from sensor_msgs.msg import NavSatFix, NavSatStatus
 from std_srvs.srv import Empty
-from urban_gnss_localization.msg import FixDecision
+from urban_gnss_localization.msg import FixDecision, GpsBias
 from urban_gnss_localization.srv import FromLL, SetPose, SetPoseRequest, ToLL
 
 sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
@@ -124,6 +125,29 @@ class GraphTest(unittest.TestCase):
         self.assertEqual([p[0] for p in live], [p[0] for p in offline])
         worst = max(math.hypot(a[1] - b[1], a[2] - b[2]) for a, b in zip(live, offline))
         self.assertLess(worst, LIVE_OFFLINE_TOLERANCE_M)
+
+    def test_bias_node_takes_the_mode_from_the_localizer(self):
+        """r-hat of `literal` is the fix's distance from the datum, about which the drive is a circle."""
+        rospy.wait_for_service("literal/particle_filter/reset", 10.0)
+        rospy.ServiceProxy("literal/particle_filter/reset", Empty)()
+        radii, news = {}, threading.Condition()
+
+        def on_bias(message):
+            with news:
+                radii[message.header.stamp.to_nsec()] = message
+                news.notify_all()
+
+        subscriber = rospy.Subscriber("literal/gps/bias", GpsBias, on_bias, queue_size=1000)
+        while subscriber.get_num_connections() == 0:
+            rospy.sleep(0.01)
+        self.graph.feed(self.drive.messages[:500])
+        examined = lambda: [m.radius for m in radii.values() if m.fix.decision != FixDecision.NOT_EXAMINED]  # noqa: E731
+        with news:
+            self.assertTrue(news.wait_for(lambda: len(examined()) > 30, 20.0), len(radii))
+        for radius in examined():
+            self.assertAlmostEqual(radius, drive.RADIUS, delta=20.0)  # without noise in it, it lags behind
+        mine = [m.radius for m in self.graph.biases if m.header.stamp.to_nsec() in radii]
+        self.assertLess(max(mine), 15.0)
 
     def test_services(self):
         """toLL and fromLL are inverse; set_pose moves the estimate, and refuses another frame."""

@@ -7,8 +7,8 @@
 
 namespace urban_gnss {
 
-/// Parameters of gps_bias_node. What it shares with the localizer, frames and InputParameters, is taken from the
-/// parameters of the node `localizer` where it is not given here.
+/// Parameters of gps_bias_node. What it shares with the localizer, frames, InputParameters and the mode, is taken from
+/// the parameters of the node `localizer` where it is not given here.
 struct GpsBiasNodeParameters {
   std::string localizer;
   Frames frames;
@@ -16,7 +16,8 @@ struct GpsBiasNodeParameters {
 
   void visit(ParameterVisitor& v) {
     v.basic()("localizer", localizer,
-              "name of the localizer's node, whose frames, antenna and fix validation apply here; empty: the defaults");
+              "name of the localizer's node, whose frames, antenna, mode and fix validation apply here; empty: the "
+              "defaults");
     v.include(frames);
     v.include(bias);
   }

@@ -15,6 +15,16 @@ Eigen::Matrix<double, 2, 4> observation() {
   return c;
 }
 
+/// What mode `literal` stands for.
+GpsBiasParameters resolved(GpsBiasParameters parameters) {
+  if (parameters.mode == ParticleFilterMode::kLiteral) {
+    parameters.bias_input = BiasInput::kPosition;
+    parameters.bias_acceleration_density = 0.0;
+    parameters.gate_probability = 1.0;
+  }
+  return parameters;
+}
+
 }  // namespace
 
 EnumNames<BiasInput> enum_names(BiasInput) {
@@ -59,9 +69,9 @@ Eigen::Matrix2d BiasKalmanFilter::position_covariance() const {
 }
 
 BiasTracker::BiasTracker(const GpsBiasParameters& parameters)
-    : parameters_(parameters),
-      gate_threshold_(parameters.gate_probability < 1.0 ? chi_squared_quantile(parameters.gate_probability, kFixDof)
-                                                        : std::numeric_limits<double>::infinity()) {
+    : parameters_(resolved(parameters)),
+      gate_threshold_(parameters_.gate_probability < 1.0 ? chi_squared_quantile(parameters_.gate_probability, kFixDof)
+                                                         : std::numeric_limits<double>::infinity()) {
   reset();
 }
 

@@ -97,37 +97,7 @@ EnumNames<LikelihoodForm> enum_names(LikelihoodForm) {
   return {{"printed", LikelihoodForm::kPrinted}, {"sum", LikelihoodForm::kSum}, {"product", LikelihoodForm::kProduct}};
 }
 
-double log_likelihood(const Pose2& pose, const FixLikelihood& fix) {
-  const auto density = [](double deviation, double sigma) { return std::exp(log_normal(deviation, sigma)); };
-  const Eigen::Vector2d d = transform_point(pose, fix.antenna_in_body) - fix.fix;
-  const double d_heading = angle_difference(pose.yaw, fix.fix_heading);
-  const double d_ring = d.norm() - fix.radius;
-  const double heading = density(d_heading, fix.heading_sigma);
-  double direct = 0.0;
-  double shadow = 0.0;
-  if (fix.form == LikelihoodForm::kProduct) {
-    direct = std::exp(-0.5 * d.dot(fix.direct_covariance.inverse() * d)) /
-             (2.0 * kPi * std::sqrt(fix.direct_covariance.determinant()));
-    shadow = density(d_ring, fix.shadow_sigma) / (2.0 * kPi * std::max(fix.radius, fix.shadow_sigma));
-    if (fix.with_heading) {
-      direct *= heading;
-      shadow *= heading;
-    }
-  } else {
-    // 1/(2 pi sigma^2) is the one-dimensional normaliser squared.
-    const auto term = [&](double deviation, double sigma) {
-      const double extra = fix.form == LikelihoodForm::kPrinted ? 1.0 / std::sqrt(2.0 * kPi * sigma * sigma) : 1.0;
-      return density(deviation, sigma) * extra;
-    };
-    const double heading_term = fix.with_heading ? term(d_heading, fix.heading_sigma) / 3.0 : 0.0;
-    direct = 2.0 / 3.0 *
-                 (term(d.x(), std::sqrt(fix.direct_covariance(0, 0))) +
-                  term(d.y(), std::sqrt(fix.direct_covariance(1, 1)))) +
-             heading_term;
-    shadow = 2.0 / 3.0 * term(d_ring, fix.shadow_sigma) + heading_term;
-  }
-  return std::log(fix.with_shadow ? 0.5 * direct + 0.5 * shadow : direct);
-}
+double log_likelihood(const Pose2& pose, const FixLikelihood& fix) { return Evaluator(fix)(pose.x, pose.y, pose.yaw); }
 
 void weigh(ParticleSet& particles, const FixLikelihood& fix) {
   const Evaluator evaluate(fix);

@@ -7,12 +7,6 @@
 
 namespace urban_gnss {
 
-EnumNames<ParticleFilterMode> enum_names(ParticleFilterMode) {
-  return {{"literal", ParticleFilterMode::kLiteral},
-          {"paper", ParticleFilterMode::kPaper},
-          {"conventional", ParticleFilterMode::kConventional}};
-}
-
 EnumNames<LikelihoodChoice> enum_names(LikelihoodChoice) {
   return {{"auto", LikelihoodChoice::kAuto},
           {"printed", LikelihoodChoice::kPrinted},
@@ -22,6 +16,12 @@ EnumNames<LikelihoodChoice> enum_names(LikelihoodChoice) {
 
 EnumNames<Switch> enum_names(Switch) {
   return {{"auto", Switch::kAuto}, {"always", Switch::kAlways}, {"never", Switch::kNever}};
+}
+
+EnumNames<EstimateChoice> enum_names(EstimateChoice) {
+  return {{"auto", EstimateChoice::kAuto},
+          {"mean", EstimateChoice::kMean},
+          {"heaviest_cluster", EstimateChoice::kHeaviestCluster}};
 }
 
 void ParticleFilterParameters::check(std::vector<std::string>& faults) const {
@@ -44,6 +44,14 @@ LikelihoodForm ParticleFilterParameters::likelihood_form() const {
 bool ParticleFilterParameters::uses_gps_heading() const {
   if (use_gps_heading != Switch::kAuto) return use_gps_heading == Switch::kAlways;
   return likelihood_form() != LikelihoodForm::kProduct;
+}
+
+bool ParticleFilterParameters::averages_all() const {
+  return estimate == EstimateChoice::kMean || (estimate == EstimateChoice::kAuto && mode != ParticleFilterMode::kPaper);
+}
+
+bool ParticleFilterParameters::is_as_printed() const {
+  return mode != ParticleFilterMode::kPaper && likelihood_form() == LikelihoodForm::kPrinted;
 }
 
 ParticleFilter::ParticleFilter(const ParticleFilterParameters& parameters, const MotionParameters& motion)
@@ -76,6 +84,7 @@ void ParticleFilter::move(const Twist2& twist, double duration_s) {
 }
 
 void ParticleFilter::doubt(const MotionDoubt& doubt) {
+  if (parameters_.is_as_printed()) return;  // the text knows no noise but that of (5) to (7)
   particles_.spread(doubt.position_m2, doubt.heading_rad2, engine_);
 }
 
@@ -120,7 +129,8 @@ void ParticleFilter::examine(const FixMeasurement& fix, FixOutcome& outcome) con
 }
 
 bool ParticleFilter::is_gated(const FixMeasurement& fix, FixOutcome& outcome) {
-  if (wants_bias() || parameters_.gate_probability >= 1.0 || outcome.nis <= nis_threshold_) return false;
+  if (wants_bias() || parameters_.is_as_printed()) return false;
+  if (parameters_.gate_probability >= 1.0 || outcome.nis <= nis_threshold_) return false;
   if (!had_fix_) {
     had_fix_ = true;
     last_accepted_time_s_ = fix.time_s;
@@ -150,7 +160,9 @@ FixLikelihood ParticleFilter::likelihood_of(const FixMeasurement& fix) const {
   likelihood.with_heading = parameters_.uses_gps_heading();
   likelihood.fix = fix.position;
   likelihood.antenna_in_body = fix.antenna_in_body;
-  likelihood.direct_covariance = parameters_.fix.direct_covariance(fix.covariance);
+  FixSigmaParameters sigma = parameters_.fix;
+  if (parameters_.is_as_printed()) sigma.use_fix_covariance = false;
+  likelihood.direct_covariance = sigma.direct_covariance(fix.covariance);
   likelihood.shadow_sigma = parameters_.fix.shadow_sigma;
   likelihood.heading_sigma = parameters_.gps_heading_sigma;
   likelihood.radius = fix.bias_radius_m;
@@ -160,8 +172,8 @@ FixLikelihood ParticleFilter::likelihood_of(const FixMeasurement& fix) const {
 
 Pose2 ParticleFilter::posterior_mean() {
   clusters_.find(particles_);
-  if (parameters_.estimate == EstimateMethod::kHeaviestCluster) return clusters_.heaviest_mean(particles_);
-  return parameters_.mode == ParticleFilterMode::kLiteral ? arithmetic_mean(particles_) : circular_mean(particles_);
+  if (!parameters_.averages_all()) return clusters_.heaviest_mean(particles_);
+  return parameters_.is_as_printed() ? arithmetic_mean(particles_) : circular_mean(particles_);
 }
 
 LocalizerHealth ParticleFilter::health() const {

@@ -106,7 +106,7 @@ ReplaySettings read_settings(const ReplayOptions& options, const LocalizerRegist
   std::vector<std::string> faults = read_tiered(maps.of_localizer, "", settings.localizer);
   // What both nodes are told alike is told once: to the localizer.
   settings.gps_bias.frames = settings.localizer.shell.frames;
-  settings.gps_bias.bias.input = settings.localizer.shell.localization.input;
+  read_tiered(maps.of_localizer, "", settings.gps_bias.bias);  // its faults are those of the localizer
   const auto of_gps_bias = read_tiered(maps.of_gps_bias, std::string(kGpsBias) + ".", settings.gps_bias);
   faults.insert(faults.end(), of_gps_bias.begin(), of_gps_bias.end());
   if (!faults.empty()) throw ParameterError("replay", faults);

@@ -6,6 +6,7 @@
 #include "urban_gnss_localization/gnss/fix.hpp"
 #include "urban_gnss_localization/gnss/fix_decision.hpp"
 #include "urban_gnss_localization/localizers/bias_estimate.hpp"
+#include "urban_gnss_localization/localizers/nishida/particle_filter_mode.hpp"
 
 namespace urban_gnss {
 
@@ -46,6 +47,7 @@ enum class BiasInput {
 EnumNames<BiasInput> enum_names(BiasInput);
 
 struct GpsBiasParameters {
+  ParticleFilterMode mode{ParticleFilterMode::kPaper};
   BiasInput bias_input{BiasInput::kResidual};
   double shadow_sigma{3.0};
   double bias_acceleration_density{0.3};
@@ -55,6 +57,8 @@ struct GpsBiasParameters {
   double shadow_probability{0.99};
 
   void visit(ParameterVisitor& v) {
+    v.basic()("mode", mode,
+              "as the particle filter's; literal: as printed, on the position, without process noise, without a gate");
     v("bias_input", bias_input,
       "input of the filter: fix minus predicted antenna (residual), or as printed (position)");
     v("shadow_sigma", shadow_sigma, positive(), "m",
@@ -72,6 +76,7 @@ struct GpsBiasParameters {
 };
 
 /// Tracks the bias from fix to fix: the Kalman filter above with its start, its gate and its recovery from a lock-out.
+/// In mode `literal` it is the printed filter: on the position, without process noise, without a gate.
 class BiasTracker {
  public:
   explicit BiasTracker(const GpsBiasParameters& parameters);

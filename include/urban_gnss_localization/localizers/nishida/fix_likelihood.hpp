@@ -29,7 +29,7 @@ struct FixLikelihood {
   double fix_heading{0.0};                                         ///< rad, theta_GPS of eq. (12)
 };
 
-/// Log of eq. (33) (or (47)) for one pose: the plain form, which `weigh` must agree with (a test compares them).
+/// Log of eq. (33) (or (47)) for one pose.
 double log_likelihood(const Pose2& pose, const FixLikelihood& fix);
 
 /// Eq. (34) without the normalisation: adds the log-likelihood to every particle's log-weight. No allocation.

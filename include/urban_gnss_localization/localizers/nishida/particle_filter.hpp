@@ -5,24 +5,20 @@
 #include "urban_gnss_localization/gnss/fix_sigma.hpp"
 #include "urban_gnss_localization/localizers/nishida/estimation.hpp"
 #include "urban_gnss_localization/localizers/nishida/fix_likelihood.hpp"
+#include "urban_gnss_localization/localizers/nishida/particle_filter_mode.hpp"
 #include "urban_gnss_localization/localizers/nishida/resampling.hpp"
 #include "urban_gnss_localization/localizers/nishida/sampling.hpp"
 #include "urban_gnss_localization/localizers/particle_localizer.hpp"
 
 namespace urban_gnss {
 
-enum class ParticleFilterMode {
-  kLiteral,       ///< the text as printed
-  kPaper,         ///< its reading that works
-  kConventional,  ///< eq. (46), (47): motion proposal, direct likelihood
-};
-EnumNames<ParticleFilterMode> enum_names(ParticleFilterMode);
-
 /// A choice that the mode makes unless it is made explicitly.
 enum class LikelihoodChoice { kAuto, kPrinted, kSum, kProduct };
 enum class Switch { kAuto, kAlways, kNever };  // YAML 1.1 reads "on" and "off" as booleans
+enum class EstimateChoice { kAuto, kMean, kHeaviestCluster };
 EnumNames<LikelihoodChoice> enum_names(LikelihoodChoice);
 EnumNames<Switch> enum_names(Switch);
+EnumNames<EstimateChoice> enum_names(EstimateChoice);
 
 struct ParticleFilterParameters {
   ParticleFilterMode mode{ParticleFilterMode::kPaper};
@@ -33,7 +29,7 @@ struct ParticleFilterParameters {
   double gps_heading_sigma{0.1};
   double ess_threshold{5.0};
   ResamplingScheme resampling{ResamplingScheme::kMultinomial};
-  EstimateMethod estimate{EstimateMethod::kHeaviestCluster};
+  EstimateChoice estimate{EstimateChoice::kAuto};
   double cluster_cell{1.0};
   double gate_probability{0.99};
   double gate_timeout{5.0};
@@ -42,7 +38,8 @@ struct ParticleFilterParameters {
 
   void visit(ParameterVisitor& v) {
     v.basic()("mode", mode,
-              "filter variant; literal: as printed; paper: the reading that works; conventional: eq. (46), (47)");
+              "filter variant; literal: as printed; paper: the reading that works; conventional: eq. (46), (47) as "
+              "printed; as printed, each fix has direct_sigma, and none is gated");
     v.include(fix);
     v("particle_count", particle_count, between(1, 1000000), "", "number of particles, M");
     v("ring_share", ring_share, between(0.0, 1.0), "",
@@ -56,11 +53,13 @@ struct ParticleFilterParameters {
     v("ess_threshold", ess_threshold, non_negative(), "",
       "effective sample size, eq. (39), below which the particles are resampled");
     v("resampling", resampling, "resampling scheme, eq. (40): multinomial, or systematic (less variance)");
-    v("estimate", estimate, "output pose, eq. (35): mean of all particles, or of the heaviest cluster");
+    v("estimate", estimate,
+      "output pose, eq. (35): mean of all particles, or of the heaviest cluster; auto: heaviest_cluster in mode paper, "
+      "else mean");
     v("cluster_cell", cluster_cell, positive(), "m",
       "cell size of the clustering; particles within one to two cells belong together");
     v("gate_probability", gate_probability, open_between(0.0, 1.0), "",
-      "probability that a good fix passes the gate (conventional); 1: no gate");
+      "probability that a good fix passes the gate (conventional with another likelihood than printed); 1: no gate");
     v("gate_timeout", gate_timeout, positive(), "s",
       "time with nothing but rejected fixes after which the filter restarts on the fix");
     v("seed", seed, any_number(), "", "seed of the random numbers; the same bag and seed give the same estimates");
@@ -70,6 +69,10 @@ struct ParticleFilterParameters {
   /// What `auto` stands for in this mode.
   LikelihoodForm likelihood_form() const;
   bool uses_gps_heading() const;
+  bool averages_all() const;
+  /// The text to the letter: its likelihood with one sigma_b, no gate, angles averaged as numbers. `literal` and
+  /// `conventional`, unless another likelihood is asked for.
+  bool is_as_printed() const;
 };
 
 /// The particle filter of Nishida et al., Algorithm 1: sample, weigh, estimate, resample.
