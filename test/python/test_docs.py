@@ -111,6 +111,19 @@ def faults_of_names(root, line):
     return faults
 
 
+def unknown_tests(root, line):
+    """Tests that a table names in italics, *`Name`*, and that are neither a gtest nor a file below test/."""
+    names = re.findall(r"(?<!\*)\*`([A-Z]\w+|test_\w+\.py)`\*(?!\*)", line)
+    if not names:
+        return []
+    sources = []
+    for folder, _, files in os.walk(os.path.join(root, "test")):
+        sources += files
+        sources += re.findall(r"^TEST(?:_[FP])?\(\w+, (\w+)\)", "".join(
+            read_text(os.path.join(folder, name)) for name in files if name.endswith(".cpp")), re.MULTILINE)
+    return ["no such test: " + name for name in names if name not in sources]
+
+
 def find_faults(root):
     """page:line of everything that is wrong."""
     faults = list(long_lines(root))
@@ -122,6 +135,7 @@ def find_faults(root):
                 fault = fault_of_link(page, link)
                 if fault:
                     faults.append("{}:{}: {}: {}".format(name, number, link, fault))
+            faults += ["{}:{}: {}".format(name, number, fault) for fault in unknown_tests(root, line)]
         # A sentence goes on in the next line, so paragraphs are looked at as a whole.
         for paragraph in re.split(r"\n\s*\n|\n(?=[-\d|])", "\n".join(prose(text))):
             faults += ["{}: {}".format(name, fault) for fault in faults_of_names(root, paragraph)]
@@ -168,7 +182,8 @@ class Check(unittest.TestCase):
             os.makedirs(os.path.join(root, "docs"))
             os.makedirs(os.path.join(root, "src/gnss"))
             for path, content in ((name, text), ("docs/other.md", "# A heading, eq. (2)\n"),
-                                  ("src/gnss/fix.cpp", "int sanitize(int a) { return a; }\n")):
+                                  ("src/gnss/fix.cpp", "int sanitize(int a) { return a; }\n"),
+                                  ("test/gnss/test_fix.cpp", "TEST(Fix, SanitizesEq1) {}\n")):
                 os.makedirs(os.path.dirname(os.path.join(root, path)), exist_ok=True)
                 with open(os.path.join(root, path), "w", encoding="utf-8") as file:
                     file.write(content)
@@ -177,8 +192,8 @@ class Check(unittest.TestCase):
     def test_good_page(self):
         self.assertEqual([], self.faults(
             "# Top\n[a](other.md) [b](other.md#a-heading-eq-2) [c](#top) [d](https://x.org/y)\n"
-            "`gnss/fix.cpp`: it\nhas `sanitize()`.\n| " + "x" * 116 + " |\nhttps://x.org/" + "y" * 200
-            + "\n```\n# no heading [e](gone.md)\n```\n"))
+            "`gnss/fix.cpp`: it\nhas `sanitize()`, *`SanitizesEq1`*, *`sanitized`*.\n"
+            "| " + "x" * 116 + " |\nhttps://x.org/" + "y" * 200 + "\n```\n# no heading [e](gone.md)\n```\n"))
 
     def test_bad_pages(self):
         for text, fault in (("[a](gone.md)", "docs/page.md:1: gone.md: no such file"),
@@ -187,6 +202,8 @@ class Check(unittest.TestCase):
                             ("ä " * 60 + "ä", "docs/page.md:1: 121 characters"),
                             ("| a |\n|---|\n| " + "b " * 59 + "|", "docs/page.md:3: 121 characters"),
                             ("in `gnss/gone.hpp`", "docs/page.md: no such file: gnss/gone"),
+                            ("| (1) | *`GoneEq1`* |", "docs/page.md:1: no such test: GoneEq1"),
+                            ("| (1) | *`test_gone.py`* |", "docs/page.md:1: no such test: test_gone.py"),
                             ("`gnss/fix.cpp`: `gone()`", "docs/page.md: no such function there: gone"),
                             ("`gnss/fix.cpp`\nand `anize()`", "docs/page.md: no such function there: anize")):
             self.assertEqual([fault], self.faults(text), text)
