@@ -14,6 +14,8 @@
 #     demo.launch scenario:=downtown_grid real_time_factor:=0.5
 #   screenshot_rviz.sh docs/images/rviz_occlusion.png /ground_truth/odom 'm.header.stamp.to_sec() > 1777863632' \
 #     demo.launch scenario:=downtown_grid occlusion:=true real_time_factor:=0.4
+#   screenshot_rviz.sh docs/images/rviz_comparison.png /ground_truth/odom 'm.header.stamp.to_sec() > 1777863660' \
+#     comparison.launch real_time_factor:=0.4
 #
 # Without a graphics card rviz draws a few frames a second: a slow simulation or bag keeps its displays in step.
 set -eo pipefail

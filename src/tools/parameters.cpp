@@ -10,6 +10,7 @@
 #include "output_file.hpp"
 #include "urban_gnss_localization/localizers/registry.hpp"
 #include "urban_gnss_localization/parameters/parameter_list.hpp"
+#include "urban_gnss_localization/ros/comparison_node_parameters.hpp"
 #include "urban_gnss_localization/ros/gps_bias_node_parameters.hpp"
 #include "urban_gnss_localization/ros/gpsd_node_parameters.hpp"
 #include "urban_gnss_localization/ros/occlusion_node.hpp"
@@ -103,6 +104,8 @@ std::vector<Page> all_pages(const LocalizerRegistry& localizers) {
        ParameterList().add(OcclusionNodeSettings()));
   node("waypoint_controller", "The steering law of Nishida et al., eq. (36) to (38).",
        ParameterList().add(WaypointControllerNodeParameters()));
+  node("comparison", "Plots the errors of several localizers, where there is a ground truth (comparison.launch).",
+       ParameterList().add(ComparisonNodeParameters()));
   node("receiver", "Fixes, velocities and satellites from the messages of a receiver's driver (docs/receivers.md).",
        ParameterList().add(ReceiverNodeParameters()));
   node("gpsd", "Fixes, velocities and satellites from gpsd (docs/receivers/gpsd.md).",

@@ -23,6 +23,8 @@ NODES = {
                       ["shadow_sigma = -1", "residual, position", "gate: no such parameter"]),
     "occlusion_node": (["_expert/voxels/voxel_size:=-1.0", "_model:=best", "_modl:=soft"],
                        ["voxel_size = -1", "conventional, paper, soft", "did you mean model?"]),
+    "comparison_node": (["_window:=0.0", "_plot_width:=9", "_localizer:=ukf"],
+                        ["window = 0", "plot_width = 9", "did you mean localizers?"]),
     "simulator_node": (["_expert/target_count:=1", "_expert/interval:=0.0", "_datum:=[95.0, 0.0, 0.0]"],
                        ["target_count = 1", "interval = 0", "datum"]),
     "gpsd_node": (["_port:=0", "_hots:=robot", "_stamps:=gps", "_expert/settle_time:=9.0"],

@@ -40,6 +40,7 @@ inline constexpr char kWeightedFix[] = "gps/fix_weighted";
 inline constexpr char kVisibility[] = "gps/visibility";
 inline constexpr char kVisibilityMarkers[] = "gps/visibility_markers";
 inline constexpr char kSkyPlot[] = "gps/sky_plot";
+inline constexpr char kErrorPlot[] = "error_plot";
 inline constexpr char kOcclusionMap[] = "occlusion_map";
 inline constexpr char kStaticTf[] = "tf_static";  ///< not in the node's namespace: /tf_static
 inline constexpr char kWorld[] = "world_markers";
