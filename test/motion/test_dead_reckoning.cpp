@@ -103,6 +103,35 @@ TEST(DeadReckoning, NoiseOfKimIsASpecialCase) {
   EXPECT_TRUE((step.noise.topLeftCorner<3, 3>().isApprox(expected, 1e-12)));
 }
 
+// Kim et al. eq. (1), and J and K of eq. (2), as printed.
+TEST(DeadReckoning, TangentIsThePrintedStep) {
+  OdometryErrorParameters parameters;
+  parameters.motion_noise_factor = 1.0;
+  parameters.position_walk = 0.05;
+  parameters.heading_walk = 0.003;
+  MotionParameters motion;
+  motion.odom_alpha1 = 4e-4;
+  motion.odom_alpha4 = 9e-4;
+  motion.odom_alpha2 = motion.odom_alpha3 = motion.odom_alpha5 = motion.odom_alpha6 = 0.0;
+  const double v = 3.0, omega = 0.8, theta = 0.7, tau = 0.1;
+  const MotionStep moved = make_motion_step({v, omega}, tau, motion, parameters);
+  const Pose2 start{1.0, 2.0, theta};
+  const DeadReckoningStep step = urban_gnss::dead_reckon(start, {}, moved, parameters, StepPath::kTangent);
+  const Pose2 printed{1.0 + tau * v * std::cos(theta), 2.0 + tau * v * std::sin(theta), theta + tau * omega};
+  EXPECT_TRUE(near(step.pose, printed, 1e-12));
+  EXPECT_FALSE(near(step.pose, urban_gnss::dead_reckon(start, {}, moved, parameters).pose, 1e-3)) << "not the chord";
+  Eigen::Matrix3d j = Eigen::Matrix3d::Identity();
+  j(0, 2) = -tau * v * std::sin(theta);
+  j(1, 2) = tau * v * std::cos(theta);
+  EXPECT_TRUE((step.transition.topLeftCorner<3, 3>().isApprox(j, 1e-12)));
+  Eigen::Matrix<double, 3, 2> k;
+  k << tau * std::cos(theta), 0.0, tau * std::sin(theta), 0.0, 0.0, tau;
+  const Eigen::Vector2d sigma_v(4e-4 * v * v / tau, 9e-4 * omega * omega / tau);
+  Eigen::Matrix3d noise = k * sigma_v.asDiagonal() * k.transpose();
+  noise.diagonal() += tau * Eigen::Vector3d(0.05 * 0.05, 0.05 * 0.05, 0.003 * 0.003);
+  EXPECT_TRUE((step.noise.topLeftCorner<3, 3>().isApprox(noise, 1e-12)));
+}
+
 // Wheels that stand have no yaw-rate bias: a parked robot does not turn.
 TEST(DeadReckoning, ParkedRobotWalksAsMuchAsItsPlaceMayBeWrong) {
   const MotionStep parked = make_motion_step({0.0, 0.005}, 4.0, {}, {});  // what a gyroscope says at a standstill

@@ -11,8 +11,14 @@ inline constexpr int kErrorStates = 5;
 using ErrorState = Eigen::Matrix<double, kErrorStates, 1>;
 using ErrorCovariance = Eigen::Matrix<double, kErrorStates, kErrorStates>;
 
-/// One step of dead reckoning: Kim et al. eq. (1), with the chord in place of the tangent, and the J and the
-/// K Sigma_v K' + Sigma_N of eq. (2), for the pose and the odometry's errors.
+/// Which way a step of constant twist goes.
+enum class StepPath {
+  kChord,    ///< along the chord of its arc, which is exact
+  kTangent,  ///< along the heading before the step: Kim et al. eq. (1) as printed
+};
+
+/// One step of dead reckoning: Kim et al. eq. (1), and the J and the K Sigma_v K' + Sigma_N of eq. (2), for the pose
+/// and the odometry's errors.
 struct DeadReckoningStep {
   Pose2 pose;                      ///< moved
   ErrorCovariance transition;      ///< J: how an error before the step shows after it
@@ -25,7 +31,7 @@ struct DeadReckoningStep {
 /// with odom_alpha1 for the speed and odom_alpha4 for the yaw rate alone; their Sigma_N are position_walk and
 /// heading_walk. At a standstill the pose stays, and only parked_walk is added.
 DeadReckoningStep dead_reckon(const Pose2& pose, const OdometryErrors& errors, const MotionStep& step,
-                              const OdometryErrorParameters& parameters);
+                              const OdometryErrorParameters& parameters, StepPath path = StepPath::kChord);
 
 /// Covariance of pose and odometry errors at a start whose pose has the given covariance.
 ErrorCovariance initial_error_covariance(const Eigen::Matrix3d& pose_covariance,
