@@ -195,9 +195,10 @@ void LocalizationPipeline::start_with(const ValidatedFix& fix) {
 }
 
 bool LocalizationPipeline::restart_with(const ValidatedFix& fix) {
+  const bool had_heading = start_.has_heading();
   const auto start = start_.find_restart(with_odometry(fix.fix), *predicted_antenna(fix.fix.stamp),
                                          integrity_.is_persistent(), events_);
-  if (!start) return false;
+  if (!start || (had_heading && localizer_->is_as_printed())) return false;
   decide_unexamined(fix, start->fix_use, true);
   start_from(*start);
   return true;
@@ -323,7 +324,7 @@ void LocalizationPipeline::guard_against_non_finite() {
 
 PoseEstimate LocalizationPipeline::estimate() const {
   PoseEstimate published = localizer_->estimate();
-  published.covariance.topLeftCorner<2, 2>() += integrity_.covariance();
+  if (!localizer_->is_as_printed()) published.covariance.topLeftCorner<2, 2>() += integrity_.covariance();
   return published;
 }
 

@@ -188,6 +188,46 @@ TEST(LocalizationPipeline, DatumThatIsSetMovesTheMap) {
   EXPECT_NEAR(rig.pipeline.frame()->to_local(kDatum).x(), -100.0, 0.01);
 }
 
+// What is ours keeps out of a method that runs as its paper prints it, however wrong that is; it is told all the same.
+TEST(LocalizationPipeline, AsPrintedIsNeitherStartedAnewNorWidened) {
+  for (const double off_m : {150.0, 25.0}) {
+    double variances[2];
+    for (const bool printed : {false, true}) {
+      Rig rig("{datum: [33.0, 130.0, 20.0], initial_pose: [" + std::to_string(off_m) + ", 0.0, 0.0]}");
+      rig.fake->printed = printed;
+      rig.run(0.0, 8.0);
+      double widest = 0.0;
+      for (int k = 81; k <= 1200; ++k) {
+        rig.run(0.1 * k, 0.1 * k);
+        for (const LocalizationOutput& output : rig.pipeline.take_outputs()) {
+          widest = std::max(widest, output.estimate.covariance(0, 0));
+        }
+      }
+      EXPECT_EQ(rig.fake->starts.size(), printed ? 1u : 2u) << off_m;
+      EXPECT_EQ(has_event(rig.pipeline, PipelineEvent::Level::kWarn, "lost"), off_m > 100.0);
+      EXPECT_EQ(rig.pipeline.report().healthy, !printed) << "the status says that the fixes contradict it";
+      variances[printed] = widest;
+      if (printed) {
+        EXPECT_EQ(widest, rig.fake->state.covariance(0, 0));
+      }
+    }
+    EXPECT_GT(variances[0], variances[1]);
+  }
+}
+
+// Without a heading it has not begun: that start is no interference.
+TEST(LocalizationPipeline, AsPrintedStartsAnewOnceItsHeadingIsKnown) {
+  Rig rig("{datum: [33.0, 130.0, 20.0], initialization_timeout: 20.0}");
+  rig.fake->printed = true;
+  for (int k = 0; k <= 210; ++k) {
+    if (k % 10 == 0) rig.pipeline.add_fix(raw_fix(Rig::at(0.1 * k), {0.0, 0.0}));
+    rig.pipeline.add_odometry({Rig::at(0.1 * k), {}, {}});
+  }
+  ASSERT_EQ(rig.fake->starts.size(), 1u);
+  rig.run(21.1, 60.0);
+  EXPECT_EQ(rig.fake->starts.size(), 2u);
+}
+
 TEST(LocalizationPipeline, DatumThatIsSetDuringTheStartLeavesNoOldFixes) {
   Rig rig("datum: [33.0, 130.0, 20.0]");
   rig.run(0.0, 3.0);  // some fixes are remembered for the start, in the old map

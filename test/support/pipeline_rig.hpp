@@ -29,12 +29,14 @@ struct FakeLocalizer : Localizer {
   std::vector<std::pair<Twist2, double>> moves;
   MotionDoubt doubted;
   std::vector<FixMeasurement> fixes;
-  bool takes{true};  ///< velocities
+  bool printed{false};  ///< is as its paper prints it
+  bool takes{true};     ///< velocities
   std::vector<VelocityMeasurement> velocities;
   bool takes_sky{true};  ///< satellites
 
   const char* name() const override { return "fake"; }
   std::string mode() const override { return "fake"; }
+  bool is_as_printed() const override { return printed; }
   bool wants_bias() const override { return wants; }
   void initialize(const PoseEstimate& start) override {
     starts.push_back(start);

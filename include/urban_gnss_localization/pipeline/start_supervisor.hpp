@@ -61,6 +61,7 @@ class StartSupervisor {
   explicit StartSupervisor(const StartParameters& parameters);
 
   bool has_started() const { return has_started_; }
+  bool has_heading() const { return !heading_is_unknown_; }
   /// It had started, and its place is not known any more.
   bool is_lost() const { return is_lost_; }
   /// What the start waits for, for people.
