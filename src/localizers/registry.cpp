@@ -1,6 +1,7 @@
 #include "urban_gnss_localization/localizers/registry.hpp"
 
 #include <algorithm>
+#include <iterator>
 #include <stdexcept>
 
 // Every localizer of the package, a line each. A folder below localizers/ provides `LocalizerEntry NAME_entry()`;
@@ -33,7 +34,8 @@ std::string LocalizerRegistry::names() const {
 }
 
 const LocalizerEntry& LocalizerRegistry::find(const std::string& name) const {
-  const auto found = std::find_if(entries_.begin(), entries_.end(), [&](const auto& each) { return each.name == name; });
+  const auto found =
+      std::find_if(entries_.begin(), entries_.end(), [&](const auto& each) { return each.name == name; });
   if (found == entries_.end()) throw std::runtime_error(name + ": no such localizer; there are " + names());
   return *found;
 }
@@ -45,14 +47,24 @@ LocalizerChoice LocalizerRegistry::choose(const std::string& name) const {
       if (variant.name == name) return {&entry, variant.assignments};
     }
   }
-  std::string others;
-  for (const LocalizerVariant& variant : variants()) others += (others.empty() ? "" : ", ") + variant.name;
-  throw std::runtime_error(name + ": no such localizer; there are " + names() + ", in comparisons also as " + others);
+  throw std::runtime_error(name + ": no such localizer; there are " + names() + ", in comparisons also as " +
+                           variant_names());
 }
 
-std::vector<LocalizerVariant> LocalizerRegistry::variants() const {
+std::vector<LocalizerVariant> LocalizerRegistry::variants(bool on_request) const {
   std::vector<LocalizerVariant> all;
-  for (const LocalizerEntry& entry : entries_) all.insert(all.end(), entry.variants.begin(), entry.variants.end());
+  for (const LocalizerEntry& entry : entries_) {
+    std::copy_if(entry.variants.begin(), entry.variants.end(), std::back_inserter(all),
+                 [&](const LocalizerVariant& variant) { return variant.on_request == on_request; });
+  }
+  return all;
+}
+
+std::string LocalizerRegistry::variant_names() const {
+  std::string all;
+  for (bool on_request : {false, true}) {
+    for (const LocalizerVariant& variant : variants(on_request)) all += (all.empty() ? "" : ", ") + variant.name;
+  }
   return all;
 }
 

@@ -262,7 +262,8 @@ int main(int argc, char** argv) {
   line.add_scenarios(options.runs.scenarios, options.runs.overrides);
   line.app()
       .add_option("--localizers", options.localizers,
-                  "comma-separated; NAME" + kWithOcclusion + ": with the covariances of the occlusion node")
+                  "comma-separated, of " + standard_localizers().variant_names() + "; NAME" + kWithOcclusion +
+                      ": with the covariances of the occlusion node")
       ->delimiter(',');
   line.add_seeds(options.runs.seed_count, options.runs.first_seed);
   line.add_duration(options.runs.duration_s);

@@ -43,6 +43,7 @@ struct LocalizerVariant {
   std::string name;                      ///< "gated_ekf"
   std::vector<std::string> assignments;  ///< "mode=gated", as --set takes them
   bool with_occlusion{false};            ///< also behind the occlusion node
+  bool on_request{false};                ///< only where it is named, as what a paper prints
 };
 
 /// What nodes, replay, experiments, reports, launch files and documents know of a localizer.

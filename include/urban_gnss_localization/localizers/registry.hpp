@@ -24,10 +24,12 @@ class LocalizerRegistry {
   const LocalizerEntry& find(const std::string& name) const;
   /// By its name or by that of a variant. Throws std::runtime_error, with all names, where there is none.
   LocalizerChoice choose(const std::string& name) const;
-  /// Of all, in their order: those who take part in a comparison.
-  std::vector<LocalizerVariant> variants() const;
+  /// Of all, in their order: those who take part in a comparison, or those who do so only where they are named.
+  std::vector<LocalizerVariant> variants(bool on_request = false) const;
   /// "a, b or c", for people.
   std::string names() const;
+  /// "a, b, c", the names of all variants, for people.
+  std::string variant_names() const;
 
  private:
   std::vector<LocalizerEntry> entries_;

@@ -136,7 +136,8 @@ int replay_main(int argc, char** argv, const LocalizerRegistry& localizers) {
   bool only_receivers = false;
   std::string odometry = "topic";
   app.add_flag("--list-variants", only_names, "print the names under which localizers are compared, and end");
-  app.add_option("--localizer", options.localizer, localizers.names() + ", or a name of --list-variants");
+  app.add_option("--localizer", options.localizer,
+                 localizers.names() + "; in comparisons also as " + localizers.variant_names());
   app.add_option("--robot", options.robot, "differential, ackermann, holonomic or car: what is known of its wheels");
   app.add_option("--params", options.params, "YAML with the nodes' parameters; repeatable, later files win");
   line.add_set("--set", options.overrides, "a parameter of the localizer, or after gps_bias. of the bias filter");
