@@ -25,7 +25,6 @@ class Contestant {
              BiasContestantRun& run)
       : is_withheld_(contestant.is_withheld), run_(run) {
     conditions.filter.mode = contestant.mode;
-    conditions.filter.adapt_every_mode = contestant.is_adapted;
     pipeline_ = std::make_unique<LocalizationPipeline>(conditions.localization,
                                                        std::make_unique<ComplementaryEkf>(conditions.filter));
     pipeline_->set_antenna_offset(scenario.vehicle.antenna().head<2>());

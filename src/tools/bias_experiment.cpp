@@ -30,7 +30,7 @@ namespace {
 constexpr std::array<const char*, 3> kPhases{"before", "between", "after"};  ///< as phase_of counts
 
 struct Options {
-  ScenarioRuns runs{{"building_pass", "open_sky"}};
+  ScenarioRuns runs{{"building_pass_dgps", "building_pass", "open_sky"}};
   std::vector<std::string> overrides;
   std::string json_file;
   std::string plots;
@@ -113,7 +113,7 @@ std::string text_of(const nlohmann::json& number, int digits) {
 
 void print(const std::string& scenario, const nlohmann::json& json) {
   std::cout << "\n== " << scenario << '\n'
-            << std::left << std::setw(17) << "" << std::right << "  mean error, m: before between   after"
+            << std::left << std::setw(22) << "" << std::right << "  mean error, m: before between   after"
             << "   max between   NEES (3): before between   after   doubted, %: before between   after"
             << "   settled after, s\n";
   std::vector<std::string> names{"fixes"};
@@ -121,7 +121,7 @@ void print(const std::string& scenario, const nlohmann::json& json) {
   for (const std::string& name : names) {
     const bool is_filter = json["filters"].contains(name);
     const nlohmann::json& of_name = is_filter ? json["filters"][name] : json["fixes"];
-    std::cout << std::left << std::setw(17) << name << std::right << std::setw(22);
+    std::cout << std::left << std::setw(22) << name << std::right << std::setw(22);
     for (const char* phase : kPhases) std::cout << text_of(of_name[phase]["position_mean_m"], 2) << std::setw(8);
     std::cout << std::setw(14) << text_of(of_name["between"]["position_max_m"], 1);
     if (is_filter) {

@@ -73,10 +73,10 @@ TEST(BiasExperiment, EveryFilterGetsTheSameDrive) {
     EXPECT_LT(mean_error_m(run, i), 10.0) << kBiasContestants[i].name;
     for (const BiasEstimate& bias : contestant.biases) {
       const FixDecision decision = bias.outcome.decision;
-      if (kBiasContestants[i].mode != ComplementaryMode::kCompensated) {
+      if (std::string(kBiasContestants[i].name).find("compensated") == std::string::npos) {
         EXPECT_EQ(bias.bias.norm(), 0.0);
       }
-      if (kBiasContestants[i].mode == ComplementaryMode::kStandard) {
+      if (std::string(kBiasContestants[i].name).find("standard") == 0) {
         EXPECT_FALSE(is_rejected(decision));
       }
       if (kBiasContestants[i].is_withheld) {

@@ -184,6 +184,28 @@ class ToolTest(unittest.TestCase):
         self.assertEqual(metrics["time_to_heading_s"], metrics["time_to_start_s"])
         self.assertIn("no message after --start", self.refuse("replay", self.path("in.bag"), "--start", 100))
 
+    def test_kim_as_printed(self):
+        """By the names of comparisons and by the parameter, the same."""
+        write_recording(self.directory)
+        self.succeed("csv_to_bag", self.directory, self.path("in.bag"))
+        trajectories = set()
+        for name, mode in (("ekf_as_printed", "standard_as_printed"), ("gated_ekf_as_printed", "gated_as_printed"),
+                           ("complementary_ekf_as_printed", "compensated_as_printed")):
+            self.succeed("replay", self.path("in.bag"), "--localizer", name, "--output", self.path("a.bag"), "--tum",
+                         self.path("a.tum"))
+            self.succeed("replay", self.path("in.bag"), "--localizer", "complementary_ekf", "--set", "mode=" + mode,
+                         "--tum", self.path("b.tum"))
+            self.assertTrue(filecmp.cmp(self.path("a.tum"), self.path("b.tum"), shallow=False), name)
+            with rosbag.Bag(self.path("a.bag")) as bag:
+                statuses = [status for _, status, _ in bag.read_messages("/status")]
+            self.assertEqual({status.mode for status in statuses}, {mode})
+            self.assertEqual({status.last_fix.nis_threshold for status in statuses if status.last_fix.nis_dof}, {7.81})
+            with open(self.path("a.tum")) as file:
+                trajectories.add(file.read())
+        self.succeed("replay", self.path("in.bag"), "--localizer", "complementary_ekf", "--tum", self.path("b.tum"))
+        with open(self.path("b.tum")) as file:
+            self.assertNotIn(file.read(), trajectories)
+
     def test_every_fix_gets_its_decision(self):
         """Also where two fixes are decided upon at once, between two messages of slow odometry."""
         write_recording(self.directory)

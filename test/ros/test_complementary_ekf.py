@@ -43,14 +43,18 @@ class ComplementaryEkfTest(unittest.TestCase):
 
     def test_mode_is_changed_live(self):
         errors = {}
-        for mode in ("standard", "gated", "compensated"):
+        for mode in ("standard", "gated", "compensated", "standard_as_printed", "gated_as_printed",
+                     "compensated_as_printed"):
             outputs, biases = self.run_in(mode)
             decisions = [bias.fix.decision for bias in biases]
             errors[mode] = drive.rmse(outputs, self.drive.truth)
             self.assertEqual(self.graph.status.mode, mode)
-            self.assertEqual(FixDecision.REJECTED_GATE in decisions, mode == "gated")
-            self.assertEqual(FixDecision.BIAS_COMPENSATED in decisions, mode == "compensated")
+            self.assertEqual(FixDecision.REJECTED_GATE in decisions, mode.startswith("gated"), mode)
+            self.assertEqual(FixDecision.BIAS_COMPENSATED in decisions, mode.startswith("compensated"), mode)
+            self.assertEqual({bias.fix.nis_threshold for bias in biases if bias.fix.nis_threshold > 0.0} == {7.81},
+                             mode.endswith("as_printed"), mode)
         self.assertLess(errors["compensated"], errors["standard"])
+        self.assertLess(errors["compensated_as_printed"], errors["standard_as_printed"])
 
     def test_bias_is_published_with_its_covariance(self):
         _, biases = self.run_in("compensated")

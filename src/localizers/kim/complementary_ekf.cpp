@@ -13,23 +13,16 @@ namespace {
 constexpr double kUnknownHeading_rad = 1.5;
 const Eigen::Matrix2d kBiasObservation = Eigen::Matrix2d::Identity();  // C: the bias adds to the fix
 
-/// The paper's states alone: what is wrong with the odometry is 0 and stays so.
-OdometryErrorParameters without_odometry_errors(OdometryErrorParameters odometry) {
-  odometry.speed_scale_sigma = odometry.speed_scale_walk = 0.0;
-  odometry.yaw_rate_bias_sigma = odometry.yaw_rate_bias_walk = 0.0;
-  return odometry;
-}
-
 }  // namespace
 
 ComplementaryEkf::ComplementaryEkf(const ComplementaryEkfParameters& parameters)
     : parameters_(parameters),
+      odometry_(odometry_of_mode()),
       detector_(parameters.detector),
       noise_monitor_(parameters.fix_noise),
-      reacquisition_(parameters.reacquisition),
       close_threshold_(chi_squared_quantile(parameters.close_probability, kFixDof)),
-      spike_threshold_(2.0 * detector_.threshold()) {  // of two degrees of freedom: the false alarms of false alarms
-  if (!parameters_.estimate_odometry_errors) parameters_.odometry = without_odometry_errors(parameters_.odometry);
+      spike_threshold_(2.0 * detector_.threshold()),  // of two degrees of freedom: the false alarms of false alarms
+      reacquisition_(parameters.reacquisition) {
   initialize({});
 }
 
@@ -37,7 +30,7 @@ void ComplementaryEkf::initialize(const PoseEstimate& start) {
   pose_ = start.pose;
   dead_reckoned_ = start.pose;
   errors_ = {};
-  filter_.set_state(ErrorState::Zero(), initial_error_covariance(start.covariance, parameters_.odometry));
+  filter_.set_state(ErrorState::Zero(), initial_error_covariance(start.covariance, odometry_));
   detector_.reset();
   noise_monitor_.reset();
   path_.setZero();
@@ -58,8 +51,9 @@ void ComplementaryEkf::initialize(const PoseEstimate& start) {
 }
 
 void ComplementaryEkf::move(const Twist2& twist, double duration_s) {
-  const MotionStep motion = make_motion_step(twist, duration_s, parameters_.motion, parameters_.odometry);
-  DeadReckoningStep step = dead_reckon(pose_, errors_, motion, parameters_.odometry);
+  const MotionStep motion = make_motion_step(twist, duration_s, parameters_.motion, odometry_);
+  DeadReckoningStep step =
+      dead_reckon(pose_, errors_, motion, odometry_, is_as_printed() ? StepPath::kTangent : StepPath::kChord);
   if (heading_search_) {
     // Which way it went is unknown: the position stays and becomes uncertain by the distance.
     const double distance_m = twist.ground_speed_mps() * duration_s;
@@ -85,8 +79,17 @@ void ComplementaryEkf::doubt(const MotionDoubt& doubt) {
 }
 
 void ComplementaryEkf::set_mode(ComplementaryMode mode) {
-  if (mode != ComplementaryMode::kCompensated) close();
+  if (mode == parameters_.mode) return;
+  close();
+  const bool was_as_printed = is_as_printed();
   parameters_.mode = mode;
+  if (is_as_printed() == was_as_printed) return;
+  odometry_ = odometry_of_mode();
+  errors_ = {};
+  filter_.set_state(ErrorState::Zero(),
+                    initial_error_covariance(filter_.bias_free_covariance().topLeftCorner<3, 3>(), odometry_));
+  common_variance_m2_ = 0.0;
+  is_inert_ = false;
 }
 
 FixOutcome ComplementaryEkf::correct(const FixMeasurement& fix) {
@@ -101,12 +104,12 @@ FixOutcome ComplementaryEkf::correct(const FixMeasurement& fix) {
   innovation.observation.leftCols<2>().setIdentity();
   innovation.observation.col(2) << -lever.y(), lever.x();
   innovation.declared = fix.covariance;
-  if (is_adaptive()) innovation.declared.diagonal().array() += reacquisition_.variance_m2(fix.time_s);
+  if (!is_as_printed()) innovation.declared.diagonal().array() += reacquisition_.variance_m2(fix.time_s);
   reacquisition_.add(fix.time_s);
   innovation.noise = noise_inflation() * innovation.declared;
   innovation.time_s = fix.time_s;
 
-  if (is_open_) {
+  if (is_open_ && !is_as_printed()) {
     const double elapsed_s = std::max(0.0, fix.time_s - last_fix_s_);
     const double share = std::exp(-elapsed_s / parameters_.fix_bias_time);
     const double grown = parameters_.fix_bias_sigma * parameters_.fix_bias_sigma * (1.0 - share * share);
@@ -125,7 +128,7 @@ FixOutcome ComplementaryEkf::correct(const FixMeasurement& fix) {
   }
   last_fix_s_ = fix.time_s;
   had_fix_ = true;
-  if (is_adaptive()) {
+  if (!is_as_printed()) {
     const double declared_m2 = 0.5 * fix.covariance.trace();
     common_variance_m2_ = parameters_.common_error.variance_m2(noise_monitor_.size() * declared_m2, declared_m2);
   }
@@ -134,12 +137,8 @@ FixOutcome ComplementaryEkf::correct(const FixMeasurement& fix) {
   return outcome;
 }
 
-bool ComplementaryEkf::is_adaptive() const {
-  return parameters_.adapt_every_mode || parameters_.mode == ComplementaryMode::kCompensated;
-}
-
 double ComplementaryEkf::noise_inflation() const {
-  if (!is_adaptive()) return 1.0;
+  if (is_as_printed()) return 1.0;
   double inflation = noise_monitor_.inflation();
   if (had_fix_ && parameters_.fix_noise.adapt_fix_noise) {
     // Errors that last for longer than the monitor's horizon, at the size that it has found.
@@ -169,11 +168,15 @@ bool ComplementaryEkf::search_heading(const FixMeasurement& fix, const Innovatio
 }
 
 void ComplementaryEkf::decide(const Innovation& innovation, FixOutcome& outcome) {
+  outcome.nis_dof = kFixDof;
+  outcome.decision = FixDecision::kAccepted;
+  if (is_as_printed()) {
+    decide_as_printed(innovation, outcome);
+    return;
+  }
   const Eigen::Matrix2d covariance = prediction_covariance(innovation) + innovation.declared;
   last_test_covariance_ = covariance;
-  outcome.nis_dof = kFixDof;
   outcome.nis_threshold = detector_.threshold();
-  outcome.decision = FixDecision::kAccepted;
   if (is_open_) {
     decide_open(innovation, outcome);
     return;
@@ -181,8 +184,7 @@ void ComplementaryEkf::decide(const Innovation& innovation, FixOutcome& outcome)
   const BiasDetection detection = detector_.test(innovation.value, covariance);
   outcome.nis = detection.nis;
   is_inert_ = detection.is_inert;
-  const bool is_biased = is_adaptive() ? detection.is_biased() : detection.is_jump;
-  if (parameters_.mode == ComplementaryMode::kStandard || !is_biased) {
+  if (parameters_.mode == ComplementaryMode::kStandard || !detection.is_biased()) {
     run_.reset();
     apply(innovation);
     if (is_inert_) outcome.reason = "gate inert: the fixes scatter far less than their covariance says";
@@ -197,22 +199,30 @@ void ComplementaryEkf::decide(const Innovation& innovation, FixOutcome& outcome)
 }
 
 void ComplementaryEkf::open_or_reject(const Innovation& innovation, FixOutcome& outcome) {
-  const Eigen::Matrix2d m0 = parameters_.fix_bias_sigma * parameters_.fix_bias_sigma * Eigen::Matrix2d::Identity();
+  const Eigen::Matrix2d m0 = initial_bias_covariance();
   const Eigen::Matrix2d covariance = prediction_covariance(innovation) + innovation.declared + m0;
   if (normalised_innovation_squared(innovation.value, covariance) > detector_.threshold()) {
     outcome.reason = "farther away than a bias explains";
     reject(innovation, outcome);
     return;
   }
-  filter_.open_bias(m0);
   if (!is_open_) opened_s_ = innovation.time_s;
-  is_open_ = true;
+  open();
   is_confirmed_ = false;
   opening_nis_ = normalised_innovation_squared(innovation.value, covariance - m0);
   insignificant_ = 0;
   doubt(innovation);
   apply(innovation);
   outcome.decision = FixDecision::kBiasCompensated;
+}
+
+Eigen::Matrix2d ComplementaryEkf::initial_bias_covariance() const {
+  return parameters_.fix_bias_sigma * parameters_.fix_bias_sigma * Eigen::Matrix2d::Identity();
+}
+
+void ComplementaryEkf::open() {
+  filter_.open_bias(initial_bias_covariance());
+  is_open_ = true;
 }
 
 void ComplementaryEkf::decide_open(const Innovation& innovation, FixOutcome& outcome) {

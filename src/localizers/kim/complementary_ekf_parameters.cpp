@@ -5,8 +5,13 @@ namespace urban_gnss {
 EnumNames<ComplementaryMode> enum_names(ComplementaryMode) {
   return {{"standard", ComplementaryMode::kStandard},
           {"gated", ComplementaryMode::kGated},
-          {"compensated", ComplementaryMode::kCompensated}};
+          {"compensated", ComplementaryMode::kCompensated},
+          {"standard_as_printed", ComplementaryMode::kStandardAsPrinted},
+          {"gated_as_printed", ComplementaryMode::kGatedAsPrinted},
+          {"compensated_as_printed", ComplementaryMode::kCompensatedAsPrinted}};
 }
+
+bool is_as_printed(ComplementaryMode mode) { return mode >= ComplementaryMode::kStandardAsPrinted; }
 
 EnumNames<LockoutPolicy> enum_names(LockoutPolicy) {
   return {{"automatic", LockoutPolicy::kAutomatic}, {"dead_reckoning", LockoutPolicy::kDeadReckoning}};

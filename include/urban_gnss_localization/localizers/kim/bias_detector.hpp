@@ -16,7 +16,7 @@ struct BiasDetectorParameters {
 
   void visit(ParameterVisitor& v) {
     v("gate_probability", gate_probability, between(0.5, 0.999999), "",
-      "probability that an unbiased fix is classified as unbiased, 2 DOF (paper: 0.95)");
+      "probability that an unbiased fix is classified as unbiased, 2 DOF");
     v("ramp_slack", ramp_slack, non_negative(), "sigma per fix",
       "drift of the innovations that the CUSUM test ignores");
     v("ramp_threshold", ramp_threshold, positive(), "sigma",
@@ -28,6 +28,9 @@ struct BiasDetectorParameters {
   }
 };
 
+/// The threshold of Kim et al. section 4.2 for the NIS, as printed: the 95 % quantile for three degrees of freedom.
+inline constexpr double kPrintedThreshold = 7.81;
+
 /// What the tests say of one innovation.
 struct BiasDetection {
   double nis{0.0};       ///< normalised innovation squared, chi-squared with 2 degrees of freedom without a bias
@@ -37,8 +40,8 @@ struct BiasDetection {
   bool is_biased() const { return is_jump || is_ramp; }
 };
 
-/// Detection of a biased fix (Kim et al. section 4.2). The paper's threshold of 7.81 is the 95 % quantile for three
-/// degrees of freedom; a horizontal fix has two.
+/// Detection of a biased fix (Kim et al. section 4.2), with the quantile for the two degrees of freedom of a horizontal
+/// fix.
 ///
 /// Beside the NIS of one fix it watches the sequence of innovations: two-sided CUSUMs (Page 1954) of their whitened
 /// components find a bias that grows slowly, with each step below the gate.

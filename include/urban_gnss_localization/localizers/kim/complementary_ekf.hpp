@@ -18,13 +18,17 @@ namespace urban_gnss {
 /// The complementary filter of Kim et al. with compensation of the fix's bias (Fig. 4).
 ///
 /// The odometry is dead-reckoned (eq. 1-3). At a fix, the difference "fix - dead reckoning" drives a Kalman filter of
-/// the dead reckoning's error, whose estimate is fed back. In `compensated` mode:
+/// the dead reckoning's error, whose estimate is fed back. In `compensated` mode, as we read it:
 ///   1. test the innovation (BiasDetector);
 ///   2. where it is taken for biased, open the bias filter: b = 0, covariance M0 (TwoStageFilter);
 ///   3. while open, let the bias walk, correct both stages, feed back the compensated error;
 ///   4. where the very next fix speaks for no bias, it was a false alarm: go on as if it had not been;
 ///   5. close it when the bias has been insignificant for some fixes, or a fix agrees with no bias again at once.
 /// The error states are the pose and, where estimate_odometry_errors, what the odometry is wrong by.
+///
+/// In `compensated_as_printed` mode the error states are the pose alone, the bias is constant, and figure 4 remains:
+/// the bias filter opens where the NIS of "fix - fed-back pose" is above 7.81, and closes where it is not.
+/// `standard_as_printed` and `gated_as_printed` are the same without a bias filter.
 ///
 /// A heading that is wrong by radians is beyond a linearisation: started without a heading, the position follows the
 /// fixes, and the filter starts once HeadingInitializer has found one.
@@ -35,6 +39,7 @@ class ComplementaryEkf : public Localizer {
 
   const char* name() const override { return "complementary_ekf"; }
   std::string mode() const override { return enum_name(parameters_.mode); }
+  bool is_as_printed() const override { return urban_gnss::is_as_printed(parameters_.mode); }
   bool wants_bias() const override { return false; }
   bool estimates_bias() const override { return true; }
   void initialize(const PoseEstimate& start) override;
@@ -45,7 +50,8 @@ class ComplementaryEkf : public Localizer {
   PoseEstimate estimate() const override;
   LocalizerHealth health() const override;
 
-  /// Takes effect at the next fix; leaving `compensated` closes the bias filter.
+  /// Takes effect at once; closes the bias filter. As printed the odometry is taken for right from then on; back to a
+  /// mode of ours its errors are as unknown as at a start.
   void set_mode(ComplementaryMode mode);
 
   /// The odometry alone since the start, which never jumps, and the correction: correction o dead_reckoned = pose.
@@ -84,16 +90,18 @@ class ComplementaryEkf : public Localizer {
     bool is_frozen;
   };
 
-  /// Whether the noise of the fixes is estimated from their scatter, and slow drifts are searched for.
-  bool is_adaptive() const;
+  /// What the mode takes the odometry's errors for.
+  OdometryErrorParameters odometry_of_mode() const;
   /// Factor on the declared covariance, as the fixes scatter and as the robot stands.
   double noise_inflation() const;
   /// Without a heading: takes the fix for the position and for the search. True where the heading was found.
   bool search_heading(const FixMeasurement& fix, const Innovation& innovation);
   void decide(const Innovation& innovation, FixOutcome& outcome);
-  void decide_compensated(const Innovation& innovation, const BiasDetection& detection, FixOutcome& outcome);
+  void decide_as_printed(const Innovation& innovation, FixOutcome& outcome);
   void decide_open(const Innovation& innovation, FixOutcome& outcome);
   void open_or_reject(const Innovation& innovation, FixOutcome& outcome);
+  void open();
+  Eigen::Matrix2d initial_bias_covariance() const;  ///< M0
   void reject(const Innovation& innovation, FixOutcome& outcome);
   /// Whether the first fix after the opening speaks for no bias; ends the bias filter where it does.
   bool is_false_alarm(const Innovation& innovation, double direct_nis, FixOutcome& outcome);
@@ -109,6 +117,7 @@ class ComplementaryEkf : public Localizer {
   void publish(const FixMeasurement& fix, const Eigen::Vector2d& predicted, const FixOutcome& outcome);
 
   ComplementaryEkfParameters parameters_;
+  OdometryErrorParameters odometry_;
   BiasDetector detector_;
   FixNoiseMonitor noise_monitor_;
   double close_threshold_;

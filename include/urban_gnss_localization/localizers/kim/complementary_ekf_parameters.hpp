@@ -11,11 +11,17 @@
 namespace urban_gnss {
 
 enum class ComplementaryMode {
-  kStandard,     ///< the paper's conventional filter (section 2.3): every fix as it is, with its declared covariance
-  kGated,        ///< the same, but a fix whose NIS is above its quantile is rejected
-  kCompensated,  ///< the paper's: its bias is estimated; the noise of the fixes is taken as they show it
+  // As we read it: with the odometry's errors as states, the noise of the fixes as they show it, and our rules.
+  kStandard,     ///< every fix is used
+  kGated,        ///< a fix that is taken for biased is rejected
+  kCompensated,  ///< its bias is estimated
+  // As Kim et al. print it: the pose alone, every fix with the covariance that it declares, a threshold of 7.81.
+  kStandardAsPrinted,     ///< section 2.3, the conventional filter
+  kGatedAsPrinted,        ///< the same, but a fix above the threshold of section 4.2 is rejected
+  kCompensatedAsPrinted,  ///< section 3 and figure 4, the proposed filter
 };
 EnumNames<ComplementaryMode> enum_names(ComplementaryMode);
+bool is_as_printed(ComplementaryMode mode);
 
 /// What happens when the fixes contradict the estimate for long.
 enum class LockoutPolicy {
@@ -33,7 +39,6 @@ OdometryErrorParameters kim_odometry_errors();
 
 struct ComplementaryEkfParameters {
   ComplementaryMode mode{ComplementaryMode::kCompensated};
-  bool adapt_every_mode{true};
   double fix_bias_sigma{20.0};
   double fix_bias_time{30.0};
   double close_probability{0.95};
@@ -55,12 +60,10 @@ struct ComplementaryEkfParameters {
 
   void visit(ParameterVisitor& v) {
     v.basic()("mode", mode,
-              "treatment of biased fixes; standard: used; gated: rejected; compensated: the bias is estimated");
-    v("adapt_every_mode", adapt_every_mode,
-      "whether standard and gated, too, take the noise from the fixes, and gated detects ramps; false: the paper's "
-      "conventional filter (section 2.3), which trusts the declared covariance");
+              "treatment of biased fixes; standard: used; gated: rejected; compensated: the bias is estimated; "
+              "..._as_printed: the same as Kim et al. print it");
     v("fix_bias_sigma", fix_bias_sigma, positive(), "m per axis",
-      "standard deviation of the bias when the bias filter opens (M0)");
+      "standard deviation of the bias when the bias filter opens (M0), also as printed");
     v("fix_bias_time", fix_bias_time, positive(), "s",
       "time constant of the bias's decay; with fix_bias_sigma it gives the growth of M");
     v("close_probability", close_probability, between(0.01, 0.999999), "",
@@ -81,19 +84,21 @@ struct ComplementaryEkfParameters {
     v("lockout_gap", lockout_gap, positive(), "s",
       "time without a fix that ends a run of rejected fixes, after which lockout_timeout counts anew");
     v("estimate_odometry_errors", estimate_odometry_errors,
-      "whether speed scale and yaw-rate bias are states; false: the paper's (x, y, heading)");
-    v.group("detector", detector, "Detection of a biased fix.");
-    v.group("fix_noise", fix_noise, "Noise of the fixes, estimated from the fixes.");
-    v.group("error_correlation", errors, "How long errors of fixes last at least, where the noise is adapted.");
-    v.group("reacquisition", reacquisition, "The first fixes after a gap, where the noise is adapted.");
-    v.group("common_error", common_error, "Error that fixes share for a whole drive, which no filter can see.");
+      "whether speed scale and yaw-rate bias are states; as printed they never are");
+    v.group("detector", detector, "Detection of a biased fix; as printed the threshold is 7.81.");
+    v.group("fix_noise", fix_noise, "Noise of the fixes, estimated from the fixes; not as printed.");
+    v.group("error_correlation", errors, "How long errors of fixes last at least; not as printed.");
+    v.group("reacquisition", reacquisition, "The first fixes after a gap; not as printed.");
+    v.group("common_error", common_error,
+            "Error that fixes share for a whole drive, which no filter can see; not as printed.");
     v.group("odometry", odometry, "Errors of the odometry.");
-    v.group("motion", motion, "Noise of the motion, Nishida et al. eq. (5) to (8).");
+    v.group("motion", motion,
+            "Noise of the motion, Nishida et al. eq. (5) to (8); alpha1 and alpha4 are the Sigma_v of Kim et al.");
   }
 };
 
-/// For the paper's own experiment: an odometry that does not wander, and errors of fixes that last as long as
-/// FixNoiseMonitor finds, with none that they share.
+/// For the paper's own experiment, in every mode: an odometry that does not wander, and errors of fixes that last as
+/// long as FixNoiseMonitor finds, with none that they share.
 ComplementaryEkfParameters published_complementary_ekf();
 
 }  // namespace urban_gnss
