@@ -3,7 +3,7 @@
 
 usage: plot_bias_experiment.py DIR
 
-Reads DIR/metrics.json and DIR/data/<scenario>/{truth,fixes,estimate_<filter>,bias_compensated}.csv, of the first seed.
+Reads DIR/metrics.json and DIR/data/<scenario>/{truth,fixes,estimate_<filter>,bias_<filter>}.csv, of the first seed.
 Writes fig6_<scenario>.png for each scenario and table.md into DIR.
 """
 
@@ -19,9 +19,14 @@ import report_common as common  # noqa: E402
 from report_common import plt  # noqa: E402
 
 PHASES = ("before", "between", "after")
-FILTERS = ("standard", "gated", "compensated", "standard_as_printed", "gated_as_printed", "withheld")
-# Those that are drawn.
-COLOURS = {"standard": "#d55e00", "gated": "#e69f00", "compensated": "#0072b2", "withheld": "#8a8a8a"}
+FILTERS = ("standard", "gated", "compensated", "standard_as_printed", "gated_as_printed", "compensated_as_printed",
+           "withheld")
+COLOURS = {"standard": "#d55e00", "gated": "#e69f00", "compensated": "#0072b2", "withheld": "#8a8a8a",
+           "standard_as_printed": "#d55e00", "compensated_as_printed": "#0072b2"}
+# What is drawn above each other: the two filters of the paper's figure as printed, and those of this package.
+GROUPS = (("as printed", ("standard_as_printed", "compensated_as_printed")),
+          ("as read here", ("standard", "gated", "compensated", "withheld")))
+COMPENSATED = ("compensated_as_printed", "compensated")  # by group
 
 
 def read(directory, name, columns):
@@ -36,58 +41,73 @@ def shade_between(axes, truth):
         axes.axvspan(inside[0], inside[-1], color=common.SHADOW_COLOUR, zorder=0)
 
 
+def draw_track(axes, title, truth, fixes, estimates):
+    """Figure 6: truth, fixes and the trajectories of some filters."""
+    axes.set_title(title, loc="left", fontsize=10)
+    at = [np.interp(fixes["t"], truth["t"], truth[axis]) for axis in ("x", "y")]
+    axes.plot(at[0] + fixes["error_x"], at[1] + fixes["error_y"], ".", markersize=2.5, color=common.FIX_COLOUR,
+              label="fix")
+    for name, estimate in estimates.items():
+        axes.plot(estimate["x"], estimate["y"], color=COLOURS[name], linewidth=1.2, label=name)
+    axes.plot(truth["x"], truth["y"], color=common.TRUTH_COLOUR, linewidth=1.0, label="truth")
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.set_xlabel("east, m")
+    axes.set_ylabel("north, m")
+
+
+def draw_error(axes, title, truth, fixes, estimates, compensated):
+    """Position errors over time, with two standard deviations of the compensated filter."""
+    axes.set_title(title, loc="left", fontsize=10)
+    shade_between(axes, truth)
+    size = np.hypot(fixes["error_x"], fixes["error_y"])
+    axes.plot(fixes["t"], size, ".", markersize=2.0, color=common.FIX_COLOUR, label="fix")
+    for name, estimate in estimates.items():
+        axes.plot(estimate["t"], estimate["error_m"], color=COLOURS[name], linewidth=1.2, label=name)
+    axes.plot(estimates[compensated]["t"], 2.0 * estimates[compensated]["sigma_m"], ":",
+              color=COLOURS[compensated], linewidth=1.0, label="its 2 sigma")
+    top = max(np.nanmax(size), max(np.nanpercentile(each["error_m"], 99.0) for each in estimates.values()))
+    axes.set_ylim(0.0, 1.1 * top)
+    axes.set_ylabel("position error, m")
+
+
+def draw_bias(axes, axis, truth, fixes, biases):
+    """The estimated bias along one axis, where its filter is open, and the true error of the fix."""
+    shade_between(axes, truth)
+    axes.plot(fixes["t"], fixes["error_" + axis], color=common.FIX_COLOUR, linewidth=1.0, label="true error of the fix")
+    for name, style, label in (("compensated", "-", "estimated bias, 2 sigma"),
+                               ("compensated_as_printed", "--", "the same as printed")):
+        bias = biases[name]
+        estimate = np.where(bias["doubted"] > 0.0, bias["bias_" + axis], np.nan)
+        if style == "-":
+            axes.fill_between(bias["t"], estimate - 2.0 * bias["sigma_" + axis], estimate + 2.0 * bias["sigma_" + axis],
+                              color=COLOURS[name], alpha=0.15, linewidth=0)
+        axes.plot(bias["t"], estimate, style, color=COLOURS[name], linewidth=1.2, label=label)
+    axes.set_ylim(1.8 * np.nanmin(fixes["error_" + axis]) - 2.0, 1.8 * np.nanmax(fixes["error_" + axis]) + 2.0)
+    axes.set_ylabel(("east" if axis == "x" else "north") + ", m")
+
+
 def draw(directory, path, seed):
     """The figure of one drive."""
     truth = read(directory, "truth", ("t", "x", "y", "phase"))
     fixes = read(directory, "fixes", ("t", "error_x", "error_y"))
-    bias = read(directory, "bias_compensated", ("t", "bias_x", "bias_y", "sigma_x", "sigma_y", "doubted"))
-    estimates = {name: read(directory, "estimate_" + name, ("t", "x", "y", "error_m", "sigma_m")) for name in COLOURS}
-
-    figure = plt.figure(figsize=(11, 12))
-    grid = figure.add_gridspec(4, 1, height_ratios=(1.5, 1.0, 0.9, 0.9), hspace=0.32)
-    track = figure.add_subplot(grid[0])
-    track.set_title("seed {}".format(seed), loc="left", fontsize=10)
-    at = [np.interp(fixes["t"], truth["t"], truth[axis]) for axis in ("x", "y")]
-    track.plot(at[0] + fixes["error_x"], at[1] + fixes["error_y"], ".", markersize=2.5, color=common.FIX_COLOUR,
-               label="fix")
-    for name in COLOURS:
-        track.plot(estimates[name]["x"], estimates[name]["y"], color=COLOURS[name], linewidth=1.2, label=name)
-    track.plot(truth["x"], truth["y"], color=common.TRUTH_COLOUR, linewidth=1.0, label="truth")
-    track.set_aspect("equal", adjustable="datalim")
-    track.set_xlabel("east, m")
-    track.set_ylabel("north, m")
-
-    error = figure.add_subplot(grid[1])
-    shade_between(error, truth)
-    error.plot(fixes["t"], np.hypot(fixes["error_x"], fixes["error_y"]), ".", markersize=2.0,
-               color=common.FIX_COLOUR, label="fix")
-    for name in COLOURS:
-        error.plot(estimates[name]["t"], estimates[name]["error_m"], color=COLOURS[name], linewidth=1.2, label=name)
-    error.plot(estimates["compensated"]["t"], 2.0 * estimates["compensated"]["sigma_m"], ":",
-               color=COLOURS["compensated"], linewidth=1.0, label="its 2 sigma")
-    top = max(np.nanmax(np.hypot(fixes["error_x"], fixes["error_y"])),
-              max(np.nanpercentile(estimates[name]["error_m"], 99.0) for name in COLOURS))
-    error.set_ylim(0.0, 1.1 * top)
-    error.set_ylabel("position error, m")
-
-    for row, axis in ((2, "x"), (3, "y")):
-        axes = figure.add_subplot(grid[row], sharex=error)
-        shade_between(axes, truth)
-        is_open = bias["doubted"] > 0.0
-        estimate = np.where(is_open, bias["bias_" + axis], np.nan)
-        sigma = bias["sigma_" + axis]
-        axes.plot(fixes["t"], fixes["error_" + axis], color=common.FIX_COLOUR, linewidth=1.0, label="true error of the fix")
-        axes.fill_between(bias["t"], estimate - 2.0 * sigma, estimate + 2.0 * sigma, color=COLOURS["compensated"],
-                          alpha=0.15, linewidth=0)
-        axes.plot(bias["t"], estimate, color=COLOURS["compensated"], linewidth=1.2, label="estimated bias, 2 sigma")
-        axes.set_ylim(1.8 * np.nanmin(fixes["error_" + axis]) - 2.0, 1.8 * np.nanmax(fixes["error_" + axis]) + 2.0)
-        axes.set_ylabel(("east" if axis == "x" else "north") + ", m")
+    biases = {name: read(directory, "bias_" + name, ("t", "bias_x", "bias_y", "sigma_x", "sigma_y", "doubted"))
+              for name in COMPENSATED}
+    figure = plt.figure(figsize=(11, 18))
+    grid = figure.add_gridspec(6, 1, height_ratios=(1.5, 1.5, 1.0, 1.0, 0.9, 0.9), hspace=0.35)
+    first_error = None
+    for row, ((title, names), compensated) in enumerate(zip(GROUPS, COMPENSATED)):
+        estimates = {name: read(directory, "estimate_" + name, ("t", "x", "y", "error_m", "sigma_m")) for name in names}
+        track = figure.add_subplot(grid[row])
+        draw_track(track, "{}, seed {}".format(title, seed), truth, fixes, estimates)
+        error = figure.add_subplot(grid[2 + row], sharex=first_error)
+        draw_error(error, title, truth, fixes, estimates, compensated)
+        first_error = first_error or error
+    for row, axis in ((4, "x"), (5, "y")):
+        draw_bias(figure.add_subplot(grid[row], sharex=first_error), axis, truth, fixes, biases)
+    for axes in figure.axes:
         common.light_grid(axes)
         common.legend_beside(axes)
-    axes.set_xlabel("time, s")
-    for axes in (track, error):
-        common.light_grid(axes)
-        common.legend_beside(axes)
+    figure.axes[-1].set_xlabel("time, s")
     common.save_figure(figure, path)
 
 
@@ -116,7 +136,7 @@ def table_of(scenario):
             name, means, common.format_number(common.number(row, "between", "position_max_m"), 1),
             nees if name != "fixes" else "", common.format_number(
                 100.0 * common.number(row, "between", "doubted_share"), 1) if name != "fixes" else "",
-            settling(row) if name == "compensated" else ""))
+            settling(row) if name in COMPENSATED else ""))
     return "\n".join(lines)
 
 

@@ -126,7 +126,8 @@ def write_bias_input(directory):
     phase = np.where(t < 40.0, 0.0, np.where(between, 1.0, 2.0))
     phases = {name: {"position_mean_m": value, "position_max_m": 2.0 * value, "nees_mean": 3.0, "doubted_share": 0.25}
               for name, value in (("before", 1.0), ("between", 4.25), ("after", 1.5))}
-    filters = ("standard", "gated", "compensated", "standard_as_printed", "gated_as_printed", "withheld")
+    filters = ("standard", "gated", "compensated", "standard_as_printed", "gated_as_printed", "compensated_as_printed",
+               "withheld")
     nowhere = dict(phases, between=dict.fromkeys(phases["between"]), after=dict.fromkeys(phases["after"]))
     scenarios = {place: {"fixes": row, "filters": {name: dict(row, settling_time_by_seed_s=times) for name in filters}}
                  for place, row, times in (("alley", phases, [0.0, 7.0]), ("field", nowhere, [None, None]))}
@@ -138,8 +139,9 @@ def write_bias_input(directory):
         for name in filters:
             write_csv(os.path.join(data, "estimate_" + name + ".csv"), t=t, x=3.0 * t + 1.0, y=np.sin(t / 9.0),
                       error_m=1.0, sigma_m=0.7)
-        write_csv(os.path.join(data, "bias_compensated.csv"), t=t, bias_x=np.where(between, 7.5, 0.0), bias_y=0.0,
-                  sigma_x=1.0, sigma_y=1.0, significant=between, doubted=between)
+        for name in ("compensated", "compensated_as_printed"):
+            write_csv(os.path.join(data, "bias_" + name + ".csv"), t=t, bias_x=np.where(between, 7.5, 0.0), bias_y=0.0,
+                      sigma_x=1.0, sigma_y=1.0, significant=between, doubted=between)
     write_json(os.path.join(directory, "metrics.json"), {
         "command": "bias_experiment", "seeds": [1, 2], "scenario_order": ["alley", "field"], "scenarios": scenarios})
 
@@ -376,7 +378,7 @@ class BiasExperimentTest(ReportCase):
         alley, field = read_text(self.path("table.md")).split("## field")
         self.assertIn("| compensated | 1.00 / 4.25 / 1.50 | 8.5 | 3.0 / 3.0 / 3.0 | 25.0 | at most 7 |", alley)
         self.assertIn("| fixes | 1.00 / 4.25 / 1.50 | 8.5 |  |  |  |", alley)
-        for name in ("standard", "gated", "standard_as_printed", "gated_as_printed", "withheld"):
+        for name in ("standard", "gated", "standard_as_printed", "gated_as_printed", "compensated_as_printed", "withheld"):
             self.assertIn("| {} |".format(name), alley)
         self.assertIn("| compensated | 1.00 / \u2013 / \u2013 | \u2013 | 3.0 / \u2013 / \u2013 |", field)
         self.assertNotIn("nan", field)
