@@ -30,7 +30,7 @@ namespace {
 constexpr std::array<const char*, 3> kPhases{"before", "between", "after"};  ///< as phase_of counts
 
 struct Options {
-  ScenarioRuns runs{{"building_pass_dgps", "building_pass", "open_sky"}};
+  ScenarioRuns runs{{"building_pass_dgps", "sudden_bias", "building_pass", "open_sky"}};
   std::vector<std::string> overrides;
   std::string json_file;
   std::string plots;

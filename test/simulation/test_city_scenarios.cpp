@@ -226,6 +226,34 @@ TEST(CityScenarios, SegwayPublishesFixesAlone) {
   }
 }
 
+// The sensors of Kim et al., section 2.1 and 4.1: 5 ms, 1 s, and 0.3 to 0.5 m in the open.
+TEST(CityScenarios, DgpsOfKim) {
+  double error_m = 0.0;
+  int count = 0;
+  for (int seed = 1; seed <= 40; ++seed) {
+    const Scenario pass = scenario("building_pass_dgps", {"duration=60", "seed=" + std::to_string(seed)});
+    const Events events = run(pass);
+    const auto odometry = of<OdometryEvent>(events, pass);
+    ASSERT_EQ(odometry.size(), 12000u);
+    EXPECT_NEAR(odometry[1].time_s - odometry[0].time_s, 0.005, 1e-9);
+    EXPECT_TRUE(of<ImuMessage>(events, pass).empty());
+    EXPECT_TRUE(of<SatellitesEvent>(events, pass).empty());
+    for (const auto& [stamp, fix] : own_fixes(events)) {
+      if (!fix.has_fix) continue;
+      EXPECT_EQ(fix.fix.velocity_sigma_mps, 0.0);
+      EXPECT_LT(std::sqrt(fix.fix.covariance(0, 0)), 1.0);
+    }
+    EXPECT_NEAR(static_cast<double>(own_fixes(events).size()), 59.0, 1.0);
+    for (const auto& truth : of<FixTruthEvent>(events, pass)) {
+      error_m += truth.content->error.head<2>().norm();
+      ++count;
+    }
+  }
+  RecordProperty("error_m", std::to_string(error_m / count));
+  EXPECT_GT(error_m / count, 0.3);
+  EXPECT_LT(error_m / count, 0.5);
+}
+
 TEST(CityScenarios, SatellitesAreReportedInWholeDegrees) {
   const Scenario city = scenario("downtown_grid", {"duration=20", "lidar.type=none"});
   const Events events = run(city);

@@ -36,7 +36,7 @@ inline constexpr std::array<BiasContestant, 7> kBiasContestants{
      {"standard_as_printed", ComplementaryMode::kStandardAsPrinted, false},
      {"gated_as_printed", ComplementaryMode::kGatedAsPrinted, false},
      {"compensated_as_printed", ComplementaryMode::kCompensatedAsPrinted, false},
-     {"withheld", ComplementaryMode::kStandardAsPrinted, true}}};
+     {"withheld", ComplementaryMode::kStandard, true}}};
 inline constexpr double kRecovered_m = 3.0;
 
 struct BiasContestantRun {

@@ -1,0 +1,86 @@
+"""The tables of bias_experiment and localizer_experiment in simulation.md are those of the stored results."""
+import importlib.util
+import json
+import os
+import re
+import sys
+import unittest
+
+ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..")
+sys.path.insert(0, os.path.join(ROOT, "reports"))
+spec = importlib.util.spec_from_file_location("plot_bias_experiment", os.path.join(ROOT, "reports",
+                                                                                  "plot_bias_experiment.py"))
+plot_bias_experiment = importlib.util.module_from_spec(spec)
+spec.loader.exec_module(plot_bias_experiment)
+
+
+def read_text(*names):
+    """A file of the package."""
+    with open(os.path.join(ROOT, *names), encoding="utf-8") as file:
+        return file.read()
+
+
+def stored(name):
+    """A result as the program wrote it."""
+    return json.loads(read_text("docs", "results", "data", name + ".json"))
+
+
+class StoredResults(unittest.TestCase):
+    """Numbers in the text cannot drift away from the results."""
+
+    def setUp(self):
+        """The page, with commands on one line."""
+        self.page = read_text("docs", "results", "simulation.md")
+        self.commands = re.sub(r",\\\n", ",", self.page)
+        self.commands = re.sub(r" *\\\n *", " ", self.commands)
+
+    def test_bias_experiment(self):
+        """Every row of every scenario, and the command."""
+        results = stored("bias_experiment")
+        self.assertIn(results["command"], self.commands)
+        self.assertEqual(results["seeds"], list(range(1, 11)))
+        for name in results["scenario_order"]:
+            rows = [line for line in plot_bias_experiment.table_of(results["scenarios"][name]).splitlines()
+                    if line.startswith("| ")]
+            self.assertEqual(len(rows), 9, name)
+            for row in rows:
+                self.assertIn(row, self.page, name)
+
+    def test_shares_that_the_text_names(self):
+        """Compensated over conventional, as printed and ours."""
+        results = stored("bias_experiment")["scenarios"]
+
+        def share(scenario, phase, ending):
+            filters = results[scenario]["filters"]
+            return "{:.0f} %".format(100.0 * filters["compensated" + ending][phase]["position_mean_m"]
+                                     / filters["standard" + ending][phase]["position_mean_m"])
+        text = " ".join(self.page.split())
+        self.assertIn("as printed has {} of the conventional one's error".format(
+            share("sudden_bias", "before", "_as_printed")), text)
+        self.assertIn("as printed it has {} (`building_pass_dgps`) and {} (`building_pass`)".format(
+            share("building_pass_dgps", "between", "_as_printed"), share("building_pass", "between", "_as_printed")), text)
+        self.assertIn("Ours has {} of our standard filter's error in `building_pass_dgps`, and {} in".format(
+            share("building_pass_dgps", "between", ""), share("building_pass", "between", "")), text)
+
+    def test_localizers(self):
+        """Every row, the command, and the figures that the README and the method's page quote."""
+        results = stored("localizers_dgps")
+        self.assertIn(results["command"], self.commands)
+        dgps, sudden = (results["scenarios"][name] for name in ("building_pass_dgps", "sudden_bias"))
+        for name in dgps:
+            cells = []
+            for of_name in (dgps[name], sudden[name]):
+                diverged = " ({})".format(of_name["diverged"]) if of_name["diverged"] else ""
+                cells.append("{:.2f} / {:.1f}{} | {:.2f}".format(of_name["rmse_m"], of_name["max_m"], diverged,
+                                                                 of_name["nees_mean"] / 3.0))
+            self.assertIn("| `{}` | {} |".format(name, " | ".join(cells)), self.page)
+        pairs = ["{:.2f} {} {:.2f} m".format(each["complementary_ekf"]["rmse_m"], "{}", each["imm_ekf"]["rmse_m"])
+                 for each in (dgps, sudden)]
+        for page, between in (("README.md", "and"), ("docs/methods/kim.md", "m against")):
+            text = " ".join(read_text(*page.split("/")).split())
+            for pair in pairs:
+                self.assertIn(pair.format(between), text, page)
+
+
+if __name__ == "__main__":
+    unittest.main()
