@@ -27,7 +27,7 @@ class WholeGraphTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         cls.news = threading.Condition()
-        cls.got = {topic: {} for topic in TOPICS}  # stamp in ns -> message
+        cls.received = {topic: {} for topic in TOPICS}  # stamp in ns -> message
         cls.buffer = tf2_ros.Buffer(cache_time=rospy.Duration(600.0), debug=False)
         cls.listener = tf2_ros.TransformListener(cls.buffer)
         for topic, kind in TOPICS.items():
@@ -35,18 +35,18 @@ class WholeGraphTest(unittest.TestCase):
         with cls.news:
             if not cls.news.wait_for(cls.has_driven, WAIT_S):
                 raise AssertionError("no %g s of estimates; messages: %s" % (
-                    DRIVE_S, {topic: len(messages) for topic, messages in cls.got.items()}))
-            cls.got = {topic: dict(messages) for topic, messages in cls.got.items()}
+                    DRIVE_S, {topic: len(messages) for topic, messages in cls.received.items()}))
+            cls.got = {topic: dict(messages) for topic, messages in cls.received.items()}  # more come during the tests
 
     @classmethod
     def on_message(cls, message, topic):
         with cls.news:
-            cls.got[topic][message.header.stamp.to_nsec()] = message
+            cls.received[topic][message.header.stamp.to_nsec()] = message
             cls.news.notify_all()
 
     @classmethod
     def has_driven(cls):
-        estimates = cls.got["odometry/filtered"]
+        estimates = cls.received["odometry/filtered"]
         return bool(estimates) and max(estimates) - min(estimates) > DRIVE_S * 1e9
 
     def test_nodes_are_separate(self):
