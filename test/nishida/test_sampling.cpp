@@ -28,26 +28,56 @@ Pose2 printed_step(const Pose2& pose, const MotionStep& step, const MotionNoise&
   return moved;
 }
 
+/// Particles before and after sample_motion(), and an engine that has yet to draw what it drew.
+struct Moved {
+  MotionStep step;
+  ParticleSet before, after;
+  RandomEngine array_engine = make_engine(2);
+  RandomEngine plain_engine = make_engine(2);
+
+  Moved(MotionModel model, const Twist2& twist)
+      : step(make_step(model, twist)), before(some_particles()), after(before) {
+    sample_motion(after, step, array_engine);
+  }
+
+  static MotionStep make_step(MotionModel model, const Twist2& twist) {
+    MotionParameters parameters;
+    parameters.motion_model = model;
+    parameters.wheelbase = 1.7;
+    return make_motion_step(twist, 0.05, parameters);
+  }
+  static ParticleSet some_particles() {
+    RandomEngine engine = make_engine(1);
+    return random_particles(500, engine);
+  }
+};
+
+TEST(SampleMotion, IsMoveNoisilyDrawByDraw) {
+  for (const MotionModel model : {MotionModel::kBicycle, MotionModel::kVelocity}) {
+    for (const Twist2 twist : {Twist2{3.0, 0.7}, Twist2{-1.0, 0.0}, Twist2{0.0, 0.4}, Twist2{0.0, 0.0},
+                               Twist2{-1.0, 0.3, 2.0}, Twist2{0.0, 0.0, -1.0}}) {
+      Moved moved(model, twist);
+      for (std::size_t i = 0; i < moved.after.size(); ++i) {
+        const Pose2 plain = move_noisily(moved.before.pose(i), moved.step, draw_motion_noise(moved.plain_engine));
+        ASSERT_TRUE(near(moved.after.pose(i), plain, 1e-13)) << i;  // metres, a dozen roundings of 1e-15
+      }
+      EXPECT_EQ(moved.array_engine, moved.plain_engine);
+      EXPECT_EQ(moved.after.log_weight, moved.before.log_weight);
+    }
+  }
+}
+
 TEST(SampleMotion, MovesEachParticleByEq8DrawByDraw) {
   for (const MotionModel model : {MotionModel::kBicycle, MotionModel::kVelocity}) {
     for (const Twist2 twist : {Twist2{3.0, 0.7}, Twist2{-1.0, 0.4}, Twist2{0.0, 0.4}, Twist2{0.0, 0.0}}) {
-      MotionParameters parameters;
-      parameters.motion_model = model;
-      parameters.wheelbase = 1.7;
-      const MotionStep step = make_motion_step(twist, 0.05, parameters);
-      RandomEngine engine = make_engine(1);
-      ParticleSet particles = random_particles(500, engine);
-      const ParticleSet before = particles;
-      RandomEngine array_engine = make_engine(2);
-      RandomEngine plain_engine = make_engine(2);
-      sample_motion(particles, step, array_engine);
-      for (std::size_t i = 0; i < particles.size(); ++i) {
-        const Pose2 printed = printed_step(before.pose(i), step, draw_motion_noise(plain_engine));
+      Moved moved(model, twist);
+      for (std::size_t i = 0; i < moved.after.size(); ++i) {
+        const Pose2 printed = printed_step(moved.before.pose(i), moved.step, draw_motion_noise(moved.plain_engine));
         // v / omega times a difference of sines loses up to six digits where omega is 1e-3.
-        ASSERT_TRUE(near(particles.pose(i), printed, 1e-9)) << i;
+        ASSERT_TRUE(near(moved.after.pose(i), printed, 1e-9)) << i;
       }
-      EXPECT_EQ(array_engine, plain_engine);
-      EXPECT_EQ(particles.log_weight, before.log_weight);
+      EXPECT_EQ(moved.array_engine, moved.plain_engine);
+      EXPECT_EQ(moved.after.log_weight, moved.before.log_weight);
     }
   }
 }

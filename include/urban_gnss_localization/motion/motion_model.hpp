@@ -146,7 +146,8 @@ inline Twist2 corrected(const Twist2& measured, const OdometryErrors& errors) {
           measured.lateral_mps + errors.speed_scale * measured.lateral_mps};
 }
 
-/// Eq. (5)-(8): one noisy step of one pose, whose noise-free part is the corrected twist.
+/// Eq. (5)-(8): one noisy step of one pose, whose noise-free part is the corrected twist. The particle filter's array
+/// form must agree with it (a test compares them).
 Pose2 move_noisily(const Pose2& pose, const MotionStep& step, const MotionNoise& noise,
                    const OdometryErrors& errors = {});
 

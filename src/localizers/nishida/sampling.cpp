@@ -8,11 +8,31 @@
 namespace urban_gnss {
 
 void sample_motion(ParticleSet& particles, const MotionStep& step, RandomEngine& engine) {
-  for (std::size_t i = 0; i < particles.size(); ++i) {
-    const Pose2 moved = move_noisily(particles.pose(i), step, draw_motion_noise(engine));
-    particles.x[i] = moved.x;
-    particles.y[i] = moved.y;
-    particles.yaw[i] = moved.yaw;
+  const std::size_t count = particles.size();
+  const double dt = step.duration_s;
+  const bool steered = step.model == MotionModel::kBicycle;
+  const double inverse_wheelbase = 1.0 / step.wheelbase_m;
+  const bool slides = step.twist.lateral_mps != 0.0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const double speed_noise = step.speed_sigma * draw_normal(engine);
+    const double speed = step.twist.speed_mps + speed_noise * step.direction.x();
+    const double input_noise = step.input_sigma * draw_normal(engine);
+    const double yaw_noise = step.yaw_rate_sigma * draw_normal(engine);
+    const double rate = steered ? speed * inverse_wheelbase * std::tan(step.steering_rad + input_noise)
+                                : step.twist.yaw_rate_radps + input_noise;
+    const double half_turn = 0.5 * rate * dt;
+    const double sinc =
+        std::abs(half_turn) < 1e-4 ? 1.0 - half_turn * half_turn / 6.0 : std::sin(half_turn) / half_turn;
+    const double chord = speed * dt * sinc;
+    const double direction = particles.yaw[i] + half_turn;
+    particles.x[i] += chord * std::cos(direction);
+    particles.y[i] += chord * std::sin(direction);
+    if (slides) {
+      const double sideways = (step.twist.lateral_mps + speed_noise * step.direction.y()) * dt * sinc;
+      particles.x[i] -= sideways * std::sin(direction);
+      particles.y[i] += sideways * std::cos(direction);
+    }
+    particles.yaw[i] = wrap_angle(particles.yaw[i] + rate * dt + yaw_noise * dt);
   }
 }
 

@@ -8,7 +8,8 @@
 
 namespace urban_gnss {
 
-/// Eq. (46) and the first line of (22): moves every particle by the noisy motion of eq. (8), move_noisily().
+/// Eq. (46) and the first line of (22): moves every particle by the noisy motion of eq. (8). The array form of
+/// `move_noisily`, without allocation.
 void sample_motion(ParticleSet& particles, const MotionStep& step, RandomEngine& engine);
 
 /// The ring part of the proposal, eq. (22)-(26): a share of the particles, chosen at random, is drawn anew on a ring of
