@@ -35,7 +35,7 @@ std::vector<std::string> words(const std::string& text) {
 class ComparisonNode {
  public:
   ComparisonNode(ros::NodeHandle& node, ros::NodeHandle& private_node)
-      : parameters_(read(private_node)),
+      : parameters_(read_private<ComparisonNodeParameters>(private_node)),
         names_(words(parameters_.localizers)),
         history_(names_.size(), from_seconds(parameters_.window), kInterval) {
     publisher_ = node.advertise<sensor_msgs::Image>(topics::kErrorPlot, 2);
@@ -52,12 +52,6 @@ class ComparisonNode {
   }
 
  private:
-  static ComparisonNodeParameters read(const ros::NodeHandle& private_node) {
-    ComparisonNodeParameters parameters;
-    read_private_parameters(private_node, parameters);
-    return parameters;
-  }
-
   static TimedPose to_timed_pose(const nav_msgs::Odometry& message) {
     const PoseEstimate estimate = to_pose_estimate(message.pose);
     return {to_stamp(message.header.stamp), estimate.pose, estimate.covariance};

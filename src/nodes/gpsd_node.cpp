@@ -18,7 +18,7 @@ namespace {
 class GpsdNode {
  public:
   GpsdNode(ros::NodeHandle& node, ros::NodeHandle& private_node)
-      : parameters_(read(private_node)),
+      : parameters_(read_private<GpsdNodeParameters>(private_node)),
         decoder_(parameters_.gpsd),
         publishers_(node),
         diagnostics_(ros::NodeHandle(), private_node) {
@@ -34,11 +34,6 @@ class GpsdNode {
   }
 
  private:
-  static GpsdNodeParameters read(const ros::NodeHandle& private_node) {
-    GpsdNodeParameters parameters;
-    read_private_parameters(private_node, parameters);
-    return parameters;
-  }
   std::string server() const { return parameters_.host + ":" + std::to_string(parameters_.port); }
 
   void read_until_stopped() {

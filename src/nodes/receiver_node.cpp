@@ -23,7 +23,7 @@ using ShapeEvent = ros::MessageEvent<const ShapeShifter>;
 class ReceiverNode {
  public:
   ReceiverNode(ros::NodeHandle& node, ros::NodeHandle& private_node)
-      : parameters_(read(private_node)),
+      : parameters_(read_private<ReceiverNodeParameters>(private_node)),
         preset_(find_receiver_preset(parameters_.receiver)),
         input_(preset_),
         publishers_(node),
@@ -38,12 +38,6 @@ class ReceiverNode {
   }
 
  private:
-  static ReceiverNodeParameters read(const ros::NodeHandle& private_node) {
-    ReceiverNodeParameters parameters;
-    read_private_parameters(private_node, parameters);
-    return parameters;
-  }
-
   void subscribe(ros::NodeHandle& node, const ReceiverTopic& topic) {
     const std::string name = node.resolveName(full_name(parameters_.ns.empty() ? preset_.ns : parameters_.ns, topic));
     const std::string fault = why_not_a_receiver(name);

@@ -9,7 +9,6 @@
 namespace urban_gnss {
 namespace {
 
-constexpr Colour kInk{0.1F, 0.1F, 0.1F, 1.0F};
 constexpr Colour kGridLine{0.82F, 0.84F, 0.87F, 1.0F};
 constexpr double kLowest_m = 0.1;
 constexpr double kLongestGap_s = 2.0;

@@ -11,8 +11,6 @@
 namespace urban_gnss {
 namespace {
 
-constexpr Colour kInk{0.1F, 0.1F, 0.1F, 1.0F};
-
 /// The sky about its zenith: azimuth clockwise from north, which is up; the horizon is a circle.
 class SkyCanvas {
  public:

@@ -27,6 +27,14 @@ void read_private_parameters(const ros::NodeHandle& private_node, P&... paramete
   finish_reading(private_node, reader);
 }
 
+/// The same of one struct, by value.
+template <class P>
+P read_private(const ros::NodeHandle& private_node) {
+  P parameters;
+  read_private_parameters(private_node, parameters);
+  return parameters;
+}
+
 /// Reads structs out of another node's parameters. Names that the structs do not have are left out. Bad values are not
 /// reported: the other node refuses them.
 template <class... P>

@@ -8,6 +8,9 @@
 
 namespace urban_gnss {
 
+/// Of text, on white.
+inline constexpr Colour kInk{0.1F, 0.1F, 0.1F, 1.0F};
+
 /// Draws into an image message, 8-bit RGB. Columns count to the right, rows downwards; what is outside is left out.
 class PixelCanvas {
  public:
