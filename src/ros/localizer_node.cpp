@@ -30,12 +30,13 @@ LocalizerNode::LocalizerNode(ros::NodeHandle& node, ros::NodeHandle& private_nod
   datum_publisher_ = node.advertise<sensor_msgs::NavSatFix>(topics::kDatum, 1, true);
 
   using Self = LocalizerNode;
+  // First, so that a datum that is latched comes before fixes of which another would be made.
+  subscribers_.push_back(node.subscribe(topics::kDatum, 10, &Self::on_datum, this));
   subscribers_.push_back(node.subscribe(topics::kOdometry, 1000, &Self::on_odometry, this, kNoDelay));
   odometry_watch_.set_subscriber(subscribers_.back());
   subscribers_.push_back(node.subscribe(topics::kFix, 100, &Self::on_fix, this, kNoDelay));
   fix_watch_.set_subscriber(subscribers_.back());
   subscribers_.push_back(node.subscribe(topics::kInitialPose, 10, &Self::on_initial_pose, this));
-  subscribers_.push_back(node.subscribe(topics::kDatum, 10, &Self::on_datum, this));
   if (pipeline_.localizer().wants_bias()) {
     subscribers_.push_back(node.subscribe(topics::kBias, 100, &Self::on_bias, this, kNoDelay));
   }
