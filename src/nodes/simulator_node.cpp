@@ -39,6 +39,7 @@ struct NodeParameters {
   bool follow_route{false};
   bool publish_clock{true};
   double real_time_factor{1.0};
+  double start_delay{0.0};
   bool wait_for_command{true};
   double command_wait{0.05};
   double command_timeout{0.5};
@@ -49,7 +50,10 @@ struct NodeParameters {
     v.basic()("datum", datum, "deg, deg, m", "origin of the paper's field");
     v.basic()("follow_route", follow_route, "drive the scenario's route on the true pose, whatever is commanded");
     v("publish_clock", publish_clock, "simulated time on /clock; the other nodes then need use_sim_time");
-    v.basic()("real_time_factor", real_time_factor, positive(), "", "seconds of the simulation in a second, at the most");
+    v.basic()("real_time_factor", real_time_factor, positive(), "",
+              "seconds of the simulation in a second, at the most");
+    v.basic()("start_delay", start_delay, non_negative(), "s",
+              "of wall time before the first step, for the nodes that are to have the datum before the first fix");
     v("wait_for_command", wait_for_command, "after each step, wait for the command that answers it");
     v("command_wait", command_wait, positive(), "s", "the longest such wait, of wall time");
     v("command_timeout", command_timeout, positive(), "s",
@@ -68,7 +72,9 @@ struct NodeParameters {
 struct SeedParameter {
   int seed{-1};
 
-  void visit(ParameterVisitor& v) { v.basic()("seed", seed, any_number(), "", "of a scenario; negative for the file's own"); }
+  void visit(ParameterVisitor& v) {
+    v.basic()("seed", seed, any_number(), "", "of a scenario; negative for the file's own");
+  }
 };
 
 class SimulatorNode {
@@ -85,7 +91,7 @@ class SimulatorNode {
           node.subscribe(topics::kCommand, 10, &SimulatorNode::on_command, this, ros::TransportHints().tcpNoDelay());
     }
     const double period_s = simulator_->interval_s() / parameters_.real_time_factor;
-    started_ = ros::WallTime::now();
+    started_ = ros::WallTime::now() + ros::WallDuration(parameters_.start_delay);
     timer_ = node.createWallTimer(ros::WallDuration(period_s), [this](const ros::WallTimerEvent&) { catch_up(); });
   }
 
@@ -141,6 +147,7 @@ class SimulatorNode {
 
   /// As many steps as the wall clock asks for: a scan that takes longer than a step is made up for by the next ones.
   void catch_up() {
+    if (wall_s() < 0.0) return;
     if (parameters_.wait_for_command && command_subscriber_.getNumPublishers() > 0) {
       lost_s_ = wall_s() - simulated_s_;  // the commands set the pace
       step();
