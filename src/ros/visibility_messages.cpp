@@ -96,6 +96,8 @@ PointCloud to_point_cloud(const sensor_msgs::PointCloud2& message) {
   return cloud;
 }
 
+OcclusionFrames to_occlusion_frames(const Frames& frames) { return {frames.map, frames.odom, frames.base_link}; }
+
 sensor_msgs::PointCloud2 to_message(const PointCloud& cloud, const ros::Time& time, const std::string& frame) {
   sensor_msgs::PointCloud2 message;
   message.header.stamp = time;
@@ -125,6 +127,19 @@ std::vector<SatelliteObservation> to_observations(const msgs::SatelliteArray& me
     observations.push_back(observation);
   }
   return observations;
+}
+
+QueuedCloud to_queued_cloud(const sensor_msgs::PointCloud2ConstPtr& message) {
+  return {to_stamp(message->header.stamp), without_leading_slash(message->header.frame_id),
+          [message] { return to_point_cloud(*message); }};
+}
+
+QueuedFix to_queued_fix(const sensor_msgs::NavSatFixConstPtr& message,
+                        std::function<void(const FixAssessment*)> settle) {
+  const bool has_position = message->status.status >= sensor_msgs::NavSatStatus::STATUS_FIX &&
+                            std::isfinite(message->latitude) && std::isfinite(message->longitude);
+  return {to_stamp(message->header.stamp), without_leading_slash(message->header.frame_id), has_position,
+          claimed_covariance(*message), std::move(settle)};
 }
 
 std::optional<Eigen::Matrix2d> claimed_covariance(const sensor_msgs::NavSatFix& fix) {

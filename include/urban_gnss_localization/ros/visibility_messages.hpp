@@ -7,12 +7,13 @@
 #include <urban_gnss_localization/Visibility.h>
 #include <visualization_msgs/MarkerArray.h>
 
-#include <Eigen/Geometry>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "urban_gnss_localization/pipeline/occlusion_pipeline.hpp"
+#include "urban_gnss_localization/pipeline/occlusion_queue.hpp"
+#include "urban_gnss_localization/ros/conversions.hpp"
 
 /// Between messages and the occlusion pipeline.
 namespace urban_gnss {
@@ -21,9 +22,15 @@ namespace urban_gnss {
 /// points that are not finite are kept. Throws std::invalid_argument that names what is wrong: a field missing or of
 /// another type, big-endian data, less data than height and row_step say.
 PointCloud to_point_cloud(const sensor_msgs::PointCloud2& message);
+OcclusionFrames to_occlusion_frames(const Frames& frames);
 sensor_msgs::PointCloud2 to_message(const PointCloud& cloud, const ros::Time& time, const std::string& frame);
 
 std::vector<SatelliteObservation> to_observations(const urban_gnss_localization::SatelliteArray& message);
+
+/// The cloud, converted when its turn comes.
+QueuedCloud to_queued_cloud(const sensor_msgs::PointCloud2ConstPtr& message);
+QueuedFix to_queued_fix(const sensor_msgs::NavSatFixConstPtr& message,
+                        std::function<void(const FixAssessment*)> settle);
 
 /// The receiver's claim, east and north, m^2; nothing where it has none that can be used.
 std::optional<Eigen::Matrix2d> claimed_covariance(const sensor_msgs::NavSatFix& fix);
