@@ -87,6 +87,7 @@ ReceiverRecording decode_receiver(const rosbag::Bag& bag, const ReplayOptions& o
   input.finish();
   take();
   recording.counts = input.counts();
+  recording.antenna_frame = input.frame_id();
   for (const auto& [topic, count] : input.unreadable()) recording.unreadable += count;
   return recording;
 }

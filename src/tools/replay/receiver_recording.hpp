@@ -19,7 +19,8 @@ struct TimedOutput {
 /// All that a receiver said in one recording, whatever it was read from. It takes the place of the topics of fix,
 /// velocity and satellites.
 struct ReceiverRecording {
-  std::string source;  ///< for people: what was read
+  std::string source;         ///< for people: what was read
+  std::string antenna_frame;  ///< that the driver's messages name; empty: none
   std::vector<TimedOutput> outputs;
   ReceiverCounts counts;
   std::size_t unreadable{0};  ///< messages that were left out

@@ -42,6 +42,22 @@ void print_receiver(const ReceiverRecording& receiver) {
             << counts.no_fixes << " solutions without a fix, " << receiver.unreadable << " unreadable messages\n";
 }
 
+void print_occlusion(const nlohmann::json& report, const std::string& topic) {
+  const auto& clouds = report["clouds"];
+  const auto& fixes = report["fixes"];
+  const auto& satellites = report["satellites"];
+  std::cout << "occlusion: " << clouds["in_map"] << " of " << clouds["received"] << " clouds of " << topic
+            << " in the map";
+  for (const auto& [reason, count] : clouds["left_out"].items()) std::cout << "; " << count << " left out: " << reason;
+  std::cout << "\n  " << fixes["weighed"] << " fixes weighed: " << fixes["with_map"] << " by the map, "
+            << fixes["widened"] << " widened, " << fixes["bad"] << " bad, " << fixes["doubted"] << " doubted; "
+            << satellites["judged"] << " satellites judged: " << satellites["free"] << " free, "
+            << satellites["blocked"] << " blocked, " << satellites["unknown"] << " unknown\n";
+  for (const auto& [missing, count] : fixes["missing"].items()) {
+    std::cout << "  " << count << " fixes without " << missing << '\n';
+  }
+}
+
 void print_summary(const ReplayRun& replay, const nlohmann::json& metrics, double wall_s, double bag_s) {
   std::cout << replay.estimate().size() << " estimates in " << std::fixed << std::setprecision(2) << wall_s << " s ("
             << std::setprecision(0) << bag_s / std::max(wall_s, 1e-3) << " times real time)\n";
@@ -88,11 +104,23 @@ void write_results(const ReplayOptions& options, const nlohmann::json& metrics, 
   }
 }
 
+/// Throws std::runtime_error where the other options leave nothing to weigh, or nothing to build a map with.
+void check_occlusion(const ReplayOptions& options) {
+  if (options.without_odometry) {
+    throw std::runtime_error("--occlusion needs odometry, in whose frame the map is built: --odom none has none");
+  }
+  if (without_leading_slash(options.fix_topic) == topics::kWeightedFix) {
+    throw std::runtime_error("--fix-topic: the fixes of gps/fix_weighted are weighed already; give the receiver's");
+  }
+}
+
 void run(const ReplayOptions& options, const LocalizerRegistry& localizers) {
   const ReplaySettings settings = read_settings(options, localizers);
   const ReplayInputs inputs(options);
 
-  ReplayRun replay(options, settings);
+  // Where nobody tells how the robot lies in the odometry's frame, the odometry does.
+  const bool odometry_is_tf = settings.occlusion && !inputs.has_transforms_from(settings.occlusion->frames.odom);
+  ReplayRun replay(options, settings, odometry_is_tf);
   Progress progress(inputs.all().size(), "messages");
   const auto start = std::chrono::steady_clock::now();
   std::size_t done = 0;
@@ -101,15 +129,21 @@ void run(const ReplayOptions& options, const LocalizerRegistry& localizers) {
     progress.report(++done);
   }
   progress.finish();
-  replay.close();
+  replay.finish();
   const double wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 
   nlohmann::json metrics = metrics_of(options, settings, replay);
   if (options.without_odometry) metrics["odometry"] = "constant-velocity model";
   if (inputs.receiver()) metrics["receiver"] = to_json(*inputs.receiver());
+  if (replay.occlusion()) metrics["occlusion"] = replay.occlusion()->report();
   write_results(options, metrics, replay);
   print_summary(replay, metrics, wall_s, inputs.duration_s());
   if (inputs.receiver()) print_receiver(*inputs.receiver());
+  if (replay.occlusion()) {
+    print_occlusion(metrics["occlusion"], options.points_topic);
+    if (odometry_is_tf)
+      std::cout << "  no tf from " << settings.occlusion->frames.odom << ": the odometry's poses are used\n";
+  }
   if (options.without_odometry) {
     std::cout << "no odometry: constant-velocity model, of the receiver's "
               << (inputs.receiver()->counts.velocities > 0 ? "velocities" : "fixes")
@@ -140,8 +174,12 @@ int replay_main(int argc, char** argv, const LocalizerRegistry& localizers) {
                  localizers.names() + "; in comparisons also as " + localizers.variant_names());
   app.add_option("--robot", options.robot, "differential, ackermann, holonomic or car: what is known of its wheels");
   app.add_option("--params", options.params, "YAML with the nodes' parameters; repeatable, later files win");
-  line.add_set("--set", options.overrides, "a parameter of the localizer, or after gps_bias. of the bias filter");
-  app.add_option("--output", options.output, "bag to write: odometry/filtered, gps/filtered, gps/bias, status, tf");
+  line.add_set(
+      "--set", options.overrides,
+      "a parameter of the localizer, or after gps_bias. of the bias filter, after occlusion. of occlusion_node");
+  app.add_option("--output", options.output,
+                 "bag to write: odometry/filtered, gps/filtered, gps/bias, status, tf; with --occlusion "
+                 "gps/fix_weighted and gps/visibility too");
   app.add_option("--fix-topic", options.fix_topic, "sensor_msgs/NavSatFix");
   app.add_option("--odom-topic", options.odom_topic, "nav_msgs/Odometry");
   const auto* velocity_topic = app.add_option(
@@ -165,6 +203,13 @@ int replay_main(int argc, char** argv, const LocalizerRegistry& localizers) {
   app.add_option("--nmea", options.nmea,
                  "log of NMEA 0183 in place of the bag's fixes, velocities and satellites; its stamps are UTC");
   app.add_option("--nmea-date", options.nmea_date, "YYYY-MM-DD of its first sentence, in place of the log's own dates");
+  auto* occlusion = app.add_flag("--occlusion", options.occlusion,
+                                 "the localizer gets the fixes as occlusion_node weighs them, by the bag's point "
+                                 "clouds, tf and satellites (docs/occlusion.md)");
+  app.add_option("--points-topic", options.points_topic, "sensor_msgs/PointCloud2 of the lidar")->needs(occlusion);
+  app.add_option("--occlusion-params", options.occlusion_params,
+                 "YAML of occlusion_node alone, as occlusion.launch takes it; before --params and --set")
+      ->needs(occlusion);
   app.add_option("--truth-topic", options.truth_topic, "nav_msgs/Odometry, for the errors only");
   app.add_option("--datum", options.datum,
                  "LAT,LON,ALT (deg, deg, m); default: the bag's gps/datum, or the first fixes")
@@ -190,6 +235,7 @@ int replay_main(int argc, char** argv, const LocalizerRegistry& localizers) {
     options.wants_satellites = satellites_topic->count() > 0 && !options.satellites_topic.empty();
     options.wants_imu = imu_topic->count() > 0 && !options.imu_topic.empty();
     options.without_odometry = odometry == "none";
+    if (options.occlusion) check_occlusion(options);
     run(options, localizers);
   });
 }

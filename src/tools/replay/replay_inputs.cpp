@@ -29,14 +29,15 @@ struct Topics {
         imu(without_leading_slash(options.imu_topic)),
         velocity(without_leading_slash(options.velocity_topic)),
         satellites(without_leading_slash(options.satellites_topic)),
+        points(without_leading_slash(options.points_topic)),
         truth(without_leading_slash(options.truth_topic)) {}
 
   /// In the order in which messages of one time are read.
   std::vector<std::string> ordered() const {
-    return {topics::kDatum, topics::kStaticTf, imu, odom, fix, velocity, satellites, truth};
+    return {topics::kDatum, topics::kStaticTf, kTf, imu, odom, points, fix, velocity, satellites, truth};
   }
 
-  std::string fix, odom, imu, velocity, satellites, truth;
+  std::string fix, odom, imu, velocity, satellites, points, truth;
 };
 
 /// Throws std::runtime_error, which lists what the bag has, where a topic that is needed has no message.
@@ -55,6 +56,28 @@ void require_topics(const rosbag::Bag& bag, const Messages& messages, const Repl
   require(options.wants_satellites && !has_receiver, "--satellites-topic", names.satellites);
 }
 
+bool has_topic(const rosbag::Bag& bag, const std::string& name) {
+  rosbag::View all(bag);
+  const auto connections = all.getConnections();
+  return std::any_of(connections.begin(), connections.end(), [&](const rosbag::ConnectionInfo* connection) {
+    return without_leading_slash(connection->topic) == name;
+  });
+}
+
+/// Throws std::runtime_error, which names the point clouds that the bag has, where the one that is wanted has none.
+void require_clouds(const rosbag::Bag& bag, const ReplayOptions& options, const Topics& names) {
+  const std::string wanted = ros::message_traits::DataType<sensor_msgs::PointCloud2>::value();
+  std::string clouds;
+  rosbag::View all(bag);
+  for (const rosbag::ConnectionInfo* connection : all.getConnections()) {
+    const bool is_cloud = connection->datatype == wanted;
+    if (is_cloud && without_leading_slash(connection->topic) == names.points) return;
+    if (is_cloud) clouds += " " + connection->topic;
+  }
+  throw std::runtime_error(options.input + " has no " + wanted + " on " + names.points + " (--points-topic); " +
+                           (clouds.empty() ? "it has none on any topic" : "it has them on" + clouds));
+}
+
 void give(const rosbag::MessageInstance& message, const Topics& names, ReplayRun& run) {
   const std::string name = without_leading_slash(message.getTopic());
   if (name == names.odom) {
@@ -69,6 +92,10 @@ void give(const rosbag::MessageInstance& message, const Topics& names, ReplayRun
     run.add_satellites(to_satellite_epoch(*expect<SatelliteArray>(message)));
   } else if (name == names.imu) {
     run.add_imu(*expect<sensor_msgs::Imu>(message));
+  } else if (name == names.points) {
+    run.add_cloud(expect<sensor_msgs::PointCloud2>(message));
+  } else if (name == kTf) {
+    run.add_tf(*expect<tf2_msgs::TFMessage>(message));
   } else if (name == topics::kStaticTf) {
     run.add_static_tf(*expect<tf2_msgs::TFMessage>(message));
   } else if (name == names.truth) {
@@ -104,7 +131,9 @@ ReplayInputs::ReplayInputs(const ReplayOptions& options) {
   if (receiver_) {
     require_overlap();
     for (const TimedOutput& each : receiver_->outputs) {
-      inputs_.push_back({each.time, [&output = each.output](ReplayRun& run) { run.add_receiver(output); }});
+      inputs_.push_back({each.time, [this, &output = each.output](ReplayRun& run) {
+                           run.add_receiver(output, receiver_->antenna_frame);
+                         }});
     }
   }
   std::stable_sort(inputs_.begin(), inputs_.end(), is_earlier);
@@ -148,6 +177,15 @@ void ReplayInputs::read_topics(const ReplayOptions& options) {
   if (options.without_odometry) {
     for (const std::string& name : {names.odom, names.imu}) leave_out(name);
   }
+  if (options.occlusion) {
+    require_clouds(bag_, options, names);
+    if (!receiver_ && !has_topic(bag_, names.satellites)) {
+      std::cerr << options.input << " has no topic " << names.satellites
+                << " (--satellites-topic): fixes are weighed by the blocked share of the sky\n";
+    }
+  } else {
+    for (const std::string& name : {names.points, std::string(kTf)}) leave_out(name);
+  }
   const std::string fused = receiver_ ? "" : why_not_a_receiver(names.fix);
   if (!fused.empty()) throw std::runtime_error("--fix-topic: " + fused);
   const Messages messages = ordered_messages(bag_, wanted);
@@ -175,6 +213,18 @@ void ReplayInputs::require_overlap() const {
   throw std::runtime_error(receiver_->source + " is of " + format_stamp(from->time) + " to " + format_stamp(to->time) +
                            " s, the rest of " + format_stamp(first->time) + " to " + format_stamp(last->time) +
                            " s: nothing is of the same time (a wrong date?)");
+}
+
+bool ReplayInputs::has_transforms_from(const std::string& frame) const {
+  rosbag::View view(bag_, [](const rosbag::ConnectionInfo* connection) {
+    return without_leading_slash(connection->topic) == kTf &&
+           connection->datatype == ros::message_traits::DataType<tf2_msgs::TFMessage>::value();
+  });
+  return std::any_of(view.begin(), view.end(), [&](const rosbag::MessageInstance& message) {
+    const auto& transforms = message.instantiate<tf2_msgs::TFMessage>()->transforms;
+    return std::any_of(transforms.begin(), transforms.end(),
+                       [&](const auto& each) { return without_leading_slash(each.header.frame_id) == frame; });
+  });
 }
 
 double ReplayInputs::duration_s() const {

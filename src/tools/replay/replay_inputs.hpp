@@ -30,6 +30,8 @@ class ReplayInputs {
   const std::vector<ReplayInput>& all() const { return inputs_; }
   /// From the first input to the last, s.
   double duration_s() const;
+  /// Whether the bag's tf has a transform from this frame to another.
+  bool has_transforms_from(const std::string& frame) const;
   /// What a receiver said, where it takes the place of topics.
   const std::optional<ReceiverRecording>& receiver() const { return receiver_; }
 

@@ -10,6 +10,7 @@
 
 #include "urban_gnss_localization/geometry/angles.hpp"
 #include "urban_gnss_localization/ros/conversions.hpp"
+#include "urban_gnss_localization/ros/receiver_messages.hpp"
 #include "urban_gnss_localization/ros/topics.hpp"
 
 namespace urban_gnss {
@@ -20,11 +21,12 @@ constexpr double kKnownHeading_rad = degrees_to_radians(10.0);
 
 }  // namespace
 
-ReplayRun::ReplayRun(const ReplayOptions& options, const ReplaySettings& settings)
+ReplayRun::ReplayRun(const ReplayOptions& options, const ReplaySettings& settings, bool odometry_is_tf)
     : shell_(settings.localizer.shell),
       pipeline_(shell_.localization, settings.localizer.localizer->make()),
       sensor_frames_(shell_.frames, shell_.wants_antenna_from_tf()),
       bias_responder_(settings.gps_bias.bias.bias) {
+  if (settings.occlusion) occlusion_.emplace(*settings.occlusion, odometry_is_tf);
   if (options.output.empty()) return;
   const std::filesystem::path path(options.output);
   if (path.has_parent_path()) std::filesystem::create_directories(path.parent_path());
@@ -41,6 +43,9 @@ void ReplayRun::add_odometry(const OdometrySample& sample) {
 void ReplayRun::add_odometry(const nav_msgs::Odometry& message) {
   sensor_frames_.observe_odometry(message.header.frame_id, message.child_frame_id);
   add_odometry(to_odometry_sample(message));
+  if (!occlusion_) return;
+  occlusion_->add_odometry(message);
+  take_weighed();
 }
 
 void ReplayRun::add_imu(const sensor_msgs::Imu& message) {
@@ -55,6 +60,19 @@ void ReplayRun::add_static_tf(const tf2_msgs::TFMessage& message) {
     transform.child_frame_id = without_leading_slash(transform.child_frame_id);
     tf_.setTransform(transform, "bag", true);
   }
+  if (!occlusion_) return;
+  occlusion_->add_tf(message, true);
+  take_weighed();
+}
+
+void ReplayRun::add_tf(const tf2_msgs::TFMessage& message) {
+  occlusion_->add_tf(message, false);
+  take_weighed();
+}
+
+void ReplayRun::add_cloud(const sensor_msgs::PointCloud2ConstPtr& message) {
+  occlusion_->add_cloud(message);
+  take_weighed();
 }
 
 void ReplayRun::look_up_sensors() {
@@ -67,6 +85,24 @@ void ReplayRun::add_fix(const RawFix& fix) {
 }
 
 void ReplayRun::add_fix(const sensor_msgs::NavSatFix& message) {
+  if (!occlusion_) return give(message);
+  occlusion_->add_fix(message);
+  take_weighed();
+}
+
+void ReplayRun::take_weighed() {
+  for (const PipelineEvent& event : occlusion_->take_events()) {
+    if (said_.insert(event.text).second) print({event});
+  }
+  for (const WeighedFix& weighed : occlusion_->take()) {
+    const Stamp stamp = to_stamp(weighed.fix.header.stamp);
+    write(topics::kWeightedFix, stamp, weighed.fix);
+    if (weighed.visibility) write(topics::kVisibility, stamp, *weighed.visibility);
+    give(weighed.fix);
+  }
+}
+
+void ReplayRun::give(const sensor_msgs::NavSatFix& message) {
   sensor_frames_.observe_fix(message.header.frame_id);
   look_up_sensors();
   add_fix(to_raw_fix(message));
@@ -80,6 +116,9 @@ void ReplayRun::add_velocity(const RawVelocity& velocity) {
 void ReplayRun::add_satellites(const SatelliteEpoch& epoch) {
   pipeline_.add_satellites(epoch.stamp, epoch.satellites);
   settle();
+  if (!occlusion_) return;
+  occlusion_->add_satellites(epoch);
+  take_weighed();
 }
 
 void ReplayRun::set_datum(const sensor_msgs::NavSatFix& message) {
@@ -90,14 +129,24 @@ void ReplayRun::set_datum(const sensor_msgs::NavSatFix& message) {
 
 void ReplayRun::add_truth(const nav_msgs::Odometry& message) { truth_.push_back(to_timed_pose(message)); }
 
-void ReplayRun::add_receiver(const ReceiverOutput& output) {
+void ReplayRun::add_receiver(const ReceiverOutput& output, const std::string& antenna_frame) {
   for (const std::string& warning : output.warnings) std::cerr << "replay: " << warning << '\n';
-  for (const RawFix& fix : output.fixes) add_fix(fix);
+  for (const RawFix& fix : output.fixes) {
+    if (occlusion_) {
+      add_fix(to_message(fix, antenna_frame));
+    } else {
+      add_fix(fix);
+    }
+  }
   for (const RawVelocity& velocity : output.velocities) add_velocity(velocity);
   for (const SatelliteEpoch& epoch : output.satellites) add_satellites(epoch);
 }
 
-void ReplayRun::close() {
+void ReplayRun::finish() {
+  if (occlusion_) {
+    occlusion_->finish();
+    take_weighed();
+  }
   if (bag_.isOpen()) bag_.close();
 }
 
@@ -139,7 +188,8 @@ void ReplayRun::settle() {
     write(topics::kFilteredFix, output.stamp, to_fix_message(output, *pipeline_.frame(), shell_.frames));
     tf2_msgs::TFMessage tf;
     tf.transforms.push_back(to_map_to_odom(output, shell_.frames, shell_.transform_time_offset));
-    write("tf", output.stamp, tf);
+    write(kTf, output.stamp, tf);
+    if (occlusion_) occlusion_->add_estimate(output, tf.transforms.front());
   }
   write_biases(pipeline_.take_bias_estimates());
   const std::vector<FixOutcome> outcomes = pipeline_.take_outcomes();

@@ -13,23 +13,26 @@ namespace urban_gnss {
 namespace {
 
 constexpr const char* kGpsBias = "gps_bias";
+constexpr const char* kOcclusion = "occlusion";
 
 /// The parameters by node, as they come together.
 struct Maps {
   std::string entry;  ///< name of the localizer's node
   YAML::Node of_localizer{YAML::NodeType::Map};
   YAML::Node of_gps_bias{YAML::NodeType::Map};
+  YAML::Node of_occlusion{YAML::NodeType::Map};
 };
 
 /// Merges the sections of a file; returns what stands outside of them.
 YAML::Node merge_sections(const std::string& file, const LocalizerRegistry& localizers, Maps& maps) {
   YAML::Node map = load_map(file);
-  std::vector<std::string> sections{kGpsBias};
+  std::vector<std::string> sections{kGpsBias, kOcclusion};
   for (const LocalizerEntry& each : localizers.entries()) sections.push_back(each.name);
   for (const std::string& section : sections) {
     if (!map[section].IsDefined()) continue;
     if (section == maps.entry) merge(maps.of_localizer, map[section]);
     if (section == kGpsBias) merge(maps.of_gps_bias, map[section]);
+    if (section == kOcclusion) merge(maps.of_occlusion, map[section]);
     map.remove(section);  // of another node
   }
   return map;
@@ -51,12 +54,13 @@ std::string robot_file(const std::string& robot) {
 }
 
 void assign_option(const std::string& text, Maps& maps) {
-  const std::string prefix = std::string(kGpsBias) + ".";
-  if (text.compare(0, prefix.size(), prefix) == 0) {
-    assign(maps.of_gps_bias, text.substr(prefix.size()));
-  } else {
-    assign(maps.of_localizer, text);
+  for (const auto& [node, map] : {std::pair(kGpsBias, maps.of_gps_bias), std::pair(kOcclusion, maps.of_occlusion)}) {
+    const std::string prefix = std::string(node) + ".";
+    if (text.compare(0, prefix.size(), prefix) != 0) continue;
+    YAML::Node of_node = map;  // the same map: a YAML::Node is a reference
+    return assign(of_node, text.substr(prefix.size()));
   }
+  assign(maps.of_localizer, text);
 }
 
 /// Where the odometry is made of what the receiver says (odometry_of_velocities()): its errors are the velocity's, they
@@ -86,10 +90,11 @@ std::optional<ListedParameter> find_seed(const LocalizerNodeSettings& localizer)
 
 ReplaySettings read_settings(const ReplayOptions& options, const LocalizerRegistry& localizers) {
   const LocalizerChoice choice = localizers.choose(options.localizer);
-  ReplaySettings settings{LocalizerNodeSettings(*choice.entry), {}};
+  ReplaySettings settings{LocalizerNodeSettings(*choice.entry), {}, {}};
   Maps maps{choice.entry->name};
   if (options.without_odometry) assign_without_odometry(settings.localizer, maps.of_localizer);
   if (!options.robot.empty()) merge_sections(robot_file(options.robot), localizers, maps);
+  if (!options.occlusion_params.empty()) merge(maps.of_occlusion, load_map(options.occlusion_params));
   for (const std::string& file : options.params) merge_file(file, localizers, maps);
   for (const std::string& text : choice.assignments) assign(maps.of_localizer, text);
   if (options.wants_imu) assign(maps.of_localizer, "expert.imu.use_imu_yaw_rate=true");
@@ -109,6 +114,12 @@ ReplaySettings read_settings(const ReplayOptions& options, const LocalizerRegist
   read_tiered(maps.of_localizer, "", settings.gps_bias.bias);  // its faults are those of the localizer
   const auto of_gps_bias = read_tiered(maps.of_gps_bias, std::string(kGpsBias) + ".", settings.gps_bias);
   faults.insert(faults.end(), of_gps_bias.begin(), of_gps_bias.end());
+  if (options.occlusion) {
+    settings.occlusion.emplace();
+    settings.occlusion->frames = settings.localizer.shell.frames;
+    const auto of_occlusion = read_tiered(maps.of_occlusion, std::string(kOcclusion) + ".", *settings.occlusion);
+    faults.insert(faults.end(), of_occlusion.begin(), of_occlusion.end());
+  }
   if (!faults.empty()) throw ParameterError("replay", faults);
   if (seed) settings.seed = std::stoi(find_seed(settings.localizer)->value);
   return settings;

@@ -1,15 +1,20 @@
 #pragma once
 
 #include <limits>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "urban_gnss_localization/localizers/registry.hpp"
 #include "urban_gnss_localization/ros/gps_bias_node_parameters.hpp"
+#include "urban_gnss_localization/ros/occlusion_node_parameters.hpp"
 #include "urban_gnss_localization/ros/registered_localizer_node.hpp"
 #include "urban_gnss_localization/ros/topics.hpp"
 
 namespace urban_gnss {
+
+/// The topic of transforms that move, in whatever namespace a node is.
+inline constexpr char kTf[] = "tf";
 
 /// What the command line says.
 struct ReplayOptions {
@@ -33,6 +38,9 @@ struct ReplayOptions {
   bool without_odometry = false;       ///< --odom none
   std::string nmea;                    ///< a log that takes the place of the bag's fixes, velocities and satellites
   std::string nmea_date;               ///< of its first sentence, YYYY-MM-DD; empty: its own
+  bool occlusion = false;              ///< the fixes are weighed by the occlusion node's pipeline
+  std::string points_topic = topics::kPoints;
+  std::string occlusion_params;  ///< a file of the occlusion node's parameters, without a section
   std::vector<double> datum;
   double start_s = 0.0;  ///< into the bag
   double duration_s = std::numeric_limits<double>::infinity();
@@ -41,16 +49,17 @@ struct ReplayOptions {
   std::string tum_file;
 };
 
-/// What the live localizer and the live bias node read.
+/// What the live localizer, the live bias node and the live occlusion node read.
 struct ReplaySettings {
   LocalizerNodeSettings localizer;
   GpsBiasNodeParameters gps_bias;
-  int seed{1};  ///< of the localizer's random numbers, where it has some
+  std::optional<OcclusionNodeSettings> occlusion;  ///< nothing without --occlusion
+  int seed{1};                                     ///< of the localizer's random numbers, where it has some
 };
 
 /// Reads the files of --params in their order, later values over earlier ones, then --set and the other options. A file
 /// holds the localizer's parameters, or a section for each node, as localization.launch takes them (`imm_ekf:`,
-/// `gps_bias:`). Throws std::runtime_error, ParameterError where a name or a value is not known.
+/// `gps_bias:`, `occlusion:`). Throws std::runtime_error, ParameterError where a name or a value is not known.
 ReplaySettings read_settings(const ReplayOptions& options, const LocalizerRegistry& localizers);
 
 }  // namespace urban_gnss
