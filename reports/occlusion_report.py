@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
-"""Tables I and II and figures 5 to 7 of Maier and Kleiner (2010) on the simulated scenarios, in one command.
+"""Tables I and II and figures 5 to 7 of Maier and Kleiner (2010), on the simulated scenarios or a bag, in one command.
 
 Runs occlusion_experiment and writes OUT/metrics.json, OUT/tables.md, OUT/fig5.png, fig6.png, fig7.png and
-OUT/report.html. With --no-run it draws what is in OUT already. The workspace must be sourced, or
+OUT/report.html. With --bag it runs replay --occlusion on a recording instead, once with each model; arguments after
+-- go to replay. With --no-run it draws what is in OUT already. The workspace must be sourced, or
 URBAN_GNSS_PROGRAMS be the folder of the built programs.
 """
 import argparse
@@ -15,6 +16,7 @@ sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 
 import numpy as np  # noqa: E402
 
+import occlusion_bag  # noqa: E402
 import report_common as common  # noqa: E402
 from report_common import plt  # noqa: E402
 
@@ -79,7 +81,9 @@ def table_1(scenarios):
     rows = []
     for scenario, content in scenarios.items():
         for model in CLASSIFYING:
-            c = content["classification"][model]
+            c = content["classification"].get(model)
+            if not c:
+                continue
             counts = [common.number(c, key) for key in ("good_called_good", "good_called_bad", "bad_called_good",
                                                         "bad_called_bad")]
             good, bad = counts[0] + counts[1], counts[2] + counts[3]
@@ -95,9 +99,11 @@ def table_2(scenarios):
     header = ("scenario", "covariances", "position, m", "change", "max, m", "orientation, deg", "change")
     rows = []
     for scenario, content in scenarios.items():
-        base = content["trajectory"]["conventional"]
+        base = content["trajectory"].get("conventional")
         for name in ("odometry",) + MODELS:
-            t = content["trajectory"][name]
+            t = content["trajectory"].get(name)
+            if not t:
+                continue
             is_improved = name in CLASSIFYING
             rows.append([scenario, name if name != "odometry" else "odometry alone", spread(t, "position"),
                          change(t, base, "position_mean_m") if is_improved else "", cell(t, "position_max_m", digits=1),
@@ -126,6 +132,39 @@ def table_nees(scenarios):
     return header, rows
 
 
+def table_fixes(scenarios):
+    """What the models say of a bag's fixes."""
+    header = ("bag, model", "fixes", "called bad", "weighed by the map", "σ median, m", "σ 95 %, m")
+    rows = [["{}, {}".format(bag, model), str(f["fixes"]), percent(f["bad"]), percent(f["with_map"]),
+             cell(f, "sigma_median_m"), cell(f, "sigma_p95_m")]
+            for bag, content in scenarios.items() for model, f in content["fixes"].items()]
+    return header, rows
+
+
+def table_satellites(scenarios):
+    """What the map says of a bag's satellites, against C/N0 and the true line of sight."""
+    header = ("bag, run", "judged", "blocked", "C/N0 free, dB-Hz", "C/N0 blocked, dB-Hz", "direct called free",
+              "hidden called blocked")
+    rows = [["{}, {}".format(bag, model), str(s["judged"]), percent(common.number(s, "blocked")),
+             cell(s, "cn0_free_dbhz", digits=1), cell(s, "cn0_blocked_dbhz", digits=1),
+             percent(common.number(s, "direct_called_free")), percent(common.number(s, "hidden_called_blocked"))]
+            for bag, content in scenarios.items() for model, s in content["satellites_of"].items()]
+    return header, rows
+
+
+def tables_of(scenarios):
+    """The tables for which there is something, with their titles."""
+    candidates = (
+        ("classification", "Table I: good and bad fixes, told apart at {:g} m".format(BAD_FIX_M), table_1),
+        ("trajectory", "Table II: errors of the Gaussian UKF; change: against the conventional covariances", table_2),
+        ("trajectory_student_t", "Errors of the Student-t UKF", table_student_t),
+        ("fix_nees", "Mean NEES of the fixes' errors over its expectation", table_nees),
+        ("fixes", "What the models say of the fixes", table_fixes),
+        ("satellites_of", "What the map says of the satellites", table_satellites))
+    return [(title, make(scenarios)) for key, title, make in candidates
+            if all(key in content for content in scenarios.values())]
+
+
 def markdown(header, rows):
     """A table for docs/."""
     lines = ["| " + " | ".join(header) + " |", "|---" * len(header) + "|"]
@@ -139,6 +178,8 @@ def plot_figure5(path, fixes):
         axes.fill_between(rows["t"], 0.0, rows["error"], color="#c9d3ea", linewidth=0)
         axes.plot(rows["t"], rows["error"], color=ERROR_COLOUR, linewidth=0.9, label="error of the fix")
         for model, style in (("conventional", "-"), ("paper", ":"), ("soft", "-")):
+            if not np.isfinite(rows["sigma_" + model]).any():
+                continue
             axes.plot(rows["t"], np.minimum(rows["sigma_" + model], SIGMA_CROP_M), style, linewidth=1.2,
                       color=MODEL_COLOURS[model], label="σ {}".format(model))
         axes.axhline(BAD_FIX_M, color="#888888", linewidth=0.7, linestyle="--")
@@ -156,18 +197,19 @@ def plot_figure5(path, fixes):
 
 def map_panels(truths):
     """A figure with an axes of equal scales for each scenario, two a row; of an odd number the flattest has its own."""
-    panel_width, panel_height, margin = 5.6, 3.9, 0.8  # inches
+    panel_width, panel_height, least_height, margin = 5.6, 3.9, 1.8, 0.8  # inches
     flatness = {s: np.ptp(t["x"]) / max(np.ptp(t["y"]), 1.0) if len(t) else 1.0 for s, t in truths.items()}
     alone = [max(flatness, key=flatness.get)] if len(truths) % 2 else []
     paired = [s for s in truths if s not in alone]
     rows = [paired[k:k + 2] for k in range(0, len(paired), 2)] + ([alone] if alone else [])
-    heights = [margin + min(panel_height, max(2.0 * panel_width / len(row) / flatness[s] for s in row)) for row in rows]
+    heights = [margin + np.clip(max(2.0 * panel_width / len(row) / flatness[s] for s in row), least_height, panel_height)
+               for row in rows]
     figure = plt.figure(figsize=(2.0 * panel_width, sum(heights)), constrained_layout=True)
     grid = figure.add_gridspec(len(heights), 2, height_ratios=heights)
     panels = {s: figure.add_subplot(grid[k // 2, k % 2]) for k, s in enumerate(paired)}
     panels.update({s: figure.add_subplot(grid[-1, :]) for s in alone})
     for scenario, axes in panels.items():
-        axes.set_aspect("equal")
+        axes.set_aspect("equal", adjustable="datalim")  # fills its place, however flat the drive
         axes.set_title(scenario, fontsize=10, loc="left")
         axes.set_xlabel("east [m]")
         axes.set_ylabel("north [m]")
@@ -175,15 +217,23 @@ def map_panels(truths):
     return figure, panels
 
 
+def draw_truth(axes, truth, width):
+    """The true trajectory, where it is known."""
+    if len(truth):
+        axes.plot(truth["x"], truth["y"], color="#f0c000", linewidth=width, zorder=1, label="true trajectory")
+
+
 def plot_figure6(path, fixes, truths):
-    """The fixes, green where the soft model calls them good and red where bad, on the true trajectory."""
+    """The fixes, green where the soft model calls them good and red where bad, on the true trajectory. Of a bag without
+    the soft model, the last that it has.
+    """
     figure, panels = map_panels({s: truths[s] for s in fixes})
     for scenario, axes in panels.items():
         rows = fixes[scenario]
-        axes.plot(truths[scenario]["x"], truths[scenario]["y"], color="#f0c000", linewidth=2.5, zorder=1,
-                  label="true trajectory")
+        model = next(m for m in reversed(MODELS) if np.isfinite(rows["sigma_" + m]).any())
+        draw_truth(axes, truths[scenario], 2.5)
         for good, colour, label in ((1, GOOD_COLOUR, "called good"), (0, BAD_COLOUR, "called bad")):
-            chosen = rows["good_soft"] == good
+            chosen = rows["good_" + model] == good
             axes.plot(rows["x"][chosen], rows["y"][chosen], ".", color=colour, markersize=2.5, zorder=3 - good,
                       label=label)
     legend = next(iter(panels.values())).legend(fontsize=8, loc="best")
@@ -196,10 +246,11 @@ def plot_figure7(path, truths, estimates):
     """The trajectories of the UKF with the conventional and the soft covariances."""
     figure, panels = map_panels(truths)
     for scenario, axes in panels.items():
-        axes.plot(truths[scenario]["x"], truths[scenario]["y"], color="#f0c000", linewidth=3.0, label="true trajectory")
+        draw_truth(axes, truths[scenario], 3.0)
         for model in ("conventional", "paper", "soft"):
             rows = estimates[scenario][model]
-            axes.plot(rows["x"], rows["y"], color=MODEL_COLOURS[model], linewidth=1.0, label=model)
+            if len(rows):
+                axes.plot(rows["x"], rows["y"], color=MODEL_COLOURS[model], linewidth=1.0, label=model)
     next(iter(panels.values())).legend(fontsize=8, loc="best")
     common.save_figure(figure, path)
 
@@ -225,15 +276,13 @@ def make_report(out):
     plot_figure7(os.path.join(out, "fig7.png"), {s: truths[s] for s in shown}, estimates)
 
     seeds = metrics.get("seeds", [])
-    tables = (("Table I: good and bad fixes, told apart at {:g} m".format(BAD_FIX_M), table_1(scenarios)),
-              ("Table II: errors of the Gaussian UKF; change: against the conventional covariances", table_2(scenarios)),
-              ("Errors of the Student-t UKF", table_student_t(scenarios)),
-              ("Mean NEES of the fixes' errors over its expectation", table_nees(scenarios)))
     page = common.HtmlPage("Occlusion: covariances of fixes and what a UKF makes of them")
-    page.paragraph("Maier and Kleiner (2010), Improved GPS Sensor Model, on simulated scenarios, {} seeds; "
-                   "the figures show seed {}.".format(len(seeds), seeds[0] if seeds else "–"))
+    where = ("on the bag {}.".format(metrics["bag"]) if "bag" in metrics else
+             "on simulated scenarios, {} seeds; the figures show seed {}.".format(len(seeds),
+                                                                                  seeds[0] if seeds else "–"))
+    page.paragraph("Maier and Kleiner (2010), Improved GPS Sensor Model, " + where)
     text = []
-    for title, (header, rows) in tables:
+    for title, (header, rows) in tables_of(scenarios):
         page.heading(title)
         page.table(header, rows)
         text.append("### {}\n\n{}".format(title, markdown(header, rows)))
@@ -256,11 +305,22 @@ def main():
     parser.add_argument("--seeds", type=int, default=10)
     parser.add_argument("--first-seed", type=int, default=1)
     parser.add_argument("--duration", type=float, help="s to simulate at most")
+    parser.add_argument("--bag", help="a recording with point clouds (docs/occlusion.md), in place of scenarios")
+    parser.add_argument("--recorded", action="store_true",
+                        help="the bag has gps/fix_weighted, gps/visibility and odometry/filtered: report these")
+    parser.add_argument("--odom-topic", default="odom", help="of the bag")
+    parser.add_argument("--truth-topic", default="ground_truth/odom",
+                        help="of the bag: nav_msgs/Odometry in the map frame; without it there are no errors")
     parser.add_argument("--no-run", action="store_true", help="draw what is there")
-    parser.add_argument("arguments", nargs="*", help="after --: passed on to occlusion_experiment")
-    options = parser.parse_args()
+    parser.epilog = "What stands after -- is passed on to occlusion_experiment, or to replay."
+    given = sys.argv[1:]
+    end = given.index("--") if "--" in given else len(given)  # argparse would take the rest for options of its own
+    options = parser.parse_args(given[:end])
+    options.arguments = given[end + 1:]
     try:
-        if not options.no_run:
+        if options.bag:
+            occlusion_bag.prepare(options.out, MODELS, options)
+        elif not options.no_run:
             os.makedirs(options.out, exist_ok=True)
             run_experiment(options.out, options)
         print(make_report(options.out))
