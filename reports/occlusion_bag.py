@@ -27,7 +27,7 @@ NAN = float("nan")
 
 
 class Recording:
-    """The messages of a bag by topics' names, whatever namespace they are in."""
+    """The messages of a bag by their topics' names, with or without a leading slash."""
 
     def __init__(self, path):
         self.path = path
@@ -38,10 +38,9 @@ class Recording:
         self.topics = sorted(self.bag.get_type_and_topic_info().topics)
 
     def messages(self, name):
-        """Those of the topic called so, or else of the first whose name ends so."""
-        full = "/" + name.lstrip("/")
-        found = [topic for topic in self.topics if topic == full] or [t for t in self.topics if t.endswith(full)]
-        for _, message, _ in self.bag.read_messages(found[:1]) if found else ():
+        """Those of the topic called so."""
+        found = [topic for topic in self.topics if topic.lstrip("/") == name.lstrip("/")]
+        for _, message, _ in self.bag.read_messages(found) if found else ():
             yield message
 
     def need(self, name):
@@ -105,8 +104,9 @@ class Run:
     def __init__(self, recording):
         self.visibilities = {stamp_of(m): m for m in recording.need("gps/visibility")}
         self.fixes = {stamp_of(m): m for m in recording.need("gps/fix_weighted")}
-        self.estimate = trajectory_of(recording.need("odometry/filtered"))
-        self.base_frame = next(recording.messages("odometry/filtered")).child_frame_id
+        estimates = recording.need("odometry/filtered")
+        self.estimate = trajectory_of(estimates)
+        self.base_frame = estimates[0].child_frame_id.lstrip("/")
 
     def stamps(self):
         """Of the fixes that were weighed."""
@@ -334,7 +334,8 @@ def write_metrics(out, paths, datum, models, options):
     for key in dict.fromkeys(("truth", *models, *trajectories)):
         trajectory = truth.poses if key == "truth" else trajectories.get(key, np.empty((0, 4)))
         write_trajectory(os.path.join(data, "trajectory_{}_{}.csv".format(name, key)), trajectory, start)
-    metrics = {"command": " ".join(sys.argv), "bag": os.path.basename(options.bag), "scenarios": {name: content}}
+    command = "rosrun urban_gnss_localization occlusion_report.py " + " ".join(sys.argv[1:])
+    metrics = {"command": command, "bag": os.path.basename(options.bag), "scenarios": {name: content}}
     with open(os.path.join(out, "metrics.json"), "w", encoding="utf-8") as stream:
         json.dump(metrics, stream, indent=2)
 

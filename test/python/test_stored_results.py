@@ -1,4 +1,4 @@
-"""The tables of bias_experiment and localizer_experiment in simulation.md are those of the stored results."""
+"""The tables of bias_experiment, localizer_experiment and a bag in simulation.md are those of the stored results."""
 import importlib.util
 import json
 import os
@@ -8,10 +8,17 @@ import unittest
 
 ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..")
 sys.path.insert(0, os.path.join(ROOT, "reports"))
-spec = importlib.util.spec_from_file_location("plot_bias_experiment", os.path.join(ROOT, "reports",
-                                                                                  "plot_bias_experiment.py"))
-plot_bias_experiment = importlib.util.module_from_spec(spec)
-spec.loader.exec_module(plot_bias_experiment)
+
+
+def load(name):
+    """A script of reports/ as a module."""
+    spec = importlib.util.spec_from_file_location(name, os.path.join(ROOT, "reports", name + ".py"))
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+plot_bias_experiment, occlusion_report = load("plot_bias_experiment"), load("occlusion_report")
 
 
 def read_text(*names):
@@ -80,6 +87,16 @@ class StoredResults(unittest.TestCase):
             text = " ".join(read_text(*page.split("/")).split())
             for pair in pairs:
                 self.assertIn(pair.format(between), text, page)
+
+    def test_bag_with_lidar(self):
+        """Every row of the tables of the bag, and the command."""
+        results = stored("occlusion_bag")
+        self.assertIn(results["command"], self.commands)
+        tables = (occlusion_report.table_1, occlusion_report.table_2, occlusion_report.table_satellites)
+        rows = [row for table in tables for row in occlusion_report.markdown(*table(results["scenarios"])).splitlines()]
+        self.assertGreater(len(rows), 12)
+        for row in rows:
+            self.assertIn(row, self.page)
 
 
 if __name__ == "__main__":
