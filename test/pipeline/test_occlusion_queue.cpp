@@ -246,7 +246,7 @@ TEST_F(OcclusionQueueTest, AClockThatIsSetBackStartsAnew) {
   tell_pose(0.0);
   work();
   ASSERT_EQ(settled.size(), 2U);
-  EXPECT_EQ(settled[1].missing, "clouds");
+  EXPECT_THAT(settled[1].missing, HasSubstr("clouds"));
   EXPECT_THAT(said(), HasSubstr("the clock was set back by 500 s"));
   // A transform of the former clock that comes late is forgotten again.
   frames.tell("odom", "base_link", at(500.1));
