@@ -133,8 +133,12 @@ class Run:
 class Truth:
     """What the recording knows better than any receiver; each part may be missing."""
 
-    def __init__(self, recording, topic):
+    def __init__(self, recording, topic, datum):
+        """`datum`: that of the runs (deg, deg, m); the poses of the recording are about its own gps/datum."""
         self.poses = trajectory_of(recording.messages(topic))
+        for message in recording.messages("gps/datum"):
+            self.poses[:, 1:3] += to_local(datum, (message.latitude, message.longitude, message.altitude))
+            break
         self.errors = {stamp_of(m): (m.vector.x, m.vector.y)
                        for m in recording.messages("ground_truth/gps_error")}
         self.lines_of_sight = {(stamp_of(m), path.constellation, path.svid): path.line_of_sight
@@ -316,7 +320,7 @@ def write_metrics(out, paths, datum, models, options):
     """OUT/metrics.json and OUT/data, as occlusion_experiment writes them."""
     recording = Recording(options.bag)
     runs = {model: Run(Recording(path)) for model, path in paths.items()}
-    truth = Truth(recording, options.truth_topic)
+    truth = Truth(recording, options.truth_topic, datum)
     stamps = sorted(set.intersection(*(set(run.stamps()) for run in runs.values())))
     if not stamps:
         raise common.ReportError("{}: no fix was weighed".format(options.bag))
