@@ -33,7 +33,8 @@ struct Topics {
         truth(without_leading_slash(options.truth_topic)) {}
 
   /// In the order in which messages of one time are read.
-  std::vector<std::string> ordered() const {
+  std::vector<std::string> ordered(bool with_occlusion) const {
+    if (!with_occlusion) return {topics::kDatum, topics::kStaticTf, imu, odom, fix, velocity, satellites, truth};
     return {topics::kDatum, topics::kStaticTf, kTf, imu, odom, points, fix, velocity, satellites, truth};
   }
 
@@ -167,7 +168,7 @@ void ReplayInputs::read_receiver(const ReplayOptions& options) {
 void ReplayInputs::read_topics(const ReplayOptions& options) {
   const auto shared_names = std::make_shared<const Topics>(options);  // one for all messages
   const Topics& names = *shared_names;
-  std::vector<std::string> wanted = names.ordered();
+  std::vector<std::string> wanted = names.ordered(options.occlusion);
   const auto leave_out = [&](const std::string& name) {
     wanted.erase(std::remove(wanted.begin(), wanted.end(), name), wanted.end());
   };
@@ -183,8 +184,6 @@ void ReplayInputs::read_topics(const ReplayOptions& options) {
       std::cerr << options.input << " has no topic " << names.satellites
                 << " (--satellites-topic): fixes are weighed by the blocked share of the sky\n";
     }
-  } else {
-    for (const std::string& name : {names.points, std::string(kTf)}) leave_out(name);
   }
   const std::string fused = receiver_ ? "" : why_not_a_receiver(names.fix);
   if (!fused.empty()) throw std::runtime_error("--fix-topic: " + fused);
