@@ -21,8 +21,12 @@ import report_common as common  # noqa: E402
 from report_common import plt  # noqa: E402
 
 SCENARIOS = ["campus_loop", "building_pass", "downtown_grid", "open_sky"]
-MODELS = ("conventional", "paper", "soft")
-CLASSIFYING = ("paper", "soft")
+AS_PRINTED = "_as_printed"  # ends the names of the models in the paper's own setting
+OURS = ("conventional", "paper", "soft")
+PRINTED = ("conventional_as_printed", "paper_as_printed")
+MODELS = OURS + PRINTED
+SETTINGS = {"our setting": OURS, "as printed": PRINTED}
+CLASSIFYING = ("paper", "soft", "paper_as_printed")
 EXPECTED_NEES = 2.0
 DEGREES = 180.0 / np.pi
 BAD_FIX_M = 6.0
@@ -30,6 +34,18 @@ SIGMA_CROP_M = 20.0  # as the paper's figure 5
 GOOD_COLOUR = "#009e73"
 BAD_COLOUR = "#d62728"
 ERROR_COLOUR = "#1f3a93"
+# Table I of the paper: fixes, right, good called good and bad, bad called good and bad.
+PAPER_TABLE_1 = {"Log 014": (1486, 0.793, 0.79, 0.21, 0.21, 0.79),
+                 "Log 042": (695, 0.730, 0.69, 0.31, 0.14, 0.86),
+                 "Log 022": (2171, 0.787, 0.84, 0.16, 0.36, 0.64)}
+# Table II of the paper: position mean, sigma and maximum (m), orientation mean and sigma (rad).
+PAPER_TABLE_2 = {"Log 014": {"odometry": (31.05, 17.49, 95.29, 0.35, 0.37),
+                             "conventional": (7.09, 9.19, 39.06, 0.29, 0.35), "paper": (4.36, 3.76, 19.01, 0.21, 0.30)},
+                 "Log 042": {"odometry": (55.24, 30.10, 116.90, 0.47, 0.53),
+                             "conventional": (4.63, 4.98, 22.21, 0.34, 0.65), "paper": (2.90, 1.74, 10.70, 0.30, 0.64)},
+                 "Log 022": {"odometry": (53.10, 34.14, 116.90, 0.28, 0.42),
+                             "conventional": (5.90, 7.76, 37.85, 0.28, 0.45), "paper": (4.65, 4.77, 37.58, 0.25, 0.45)}}
+TABLE_2_KEYS = ("position_mean_m", "position_sigma_m", "position_max_m", "heading_mean_rad", "heading_sigma_rad")
 FIX_COLUMNS = ("t", "x", "y", "error", "sigma_claimed") + tuple(
     "{}_{}".format(what, model) for model in MODELS for what in ("sigma", "good"))
 TRAJECTORY_COLUMNS = ("t", "x", "y", "yaw")
@@ -71,11 +87,16 @@ def spread(content, name, scale=1.0, digits=2):
 def change(row, base, key):
     """By how much of `base` the row is above it, as text."""
     ratio = common.number(row, key) / common.number(base, key) - 1.0
-    return "{:+.0f} %".format(100.0 * ratio) if np.isfinite(ratio) else "–"
+    return "{:+.1f} %".format(100.0 * ratio) if np.isfinite(ratio) else "–"
+
+
+def base_of(model):
+    """The conventional model of the same setting."""
+    return "conventional" + (AS_PRINTED if model.endswith(AS_PRINTED) else "")
 
 
 def table_1(scenarios):
-    """Classification of good and bad fixes with the confusion matrix."""
+    """Classification of good and bad fixes with the confusion matrix; the paper's own in italics."""
     header = ("scenario, model", "fixes", "right", "good called good", "good called bad", "bad called good",
               "bad called bad")
     rows = []
@@ -91,24 +112,36 @@ def table_1(scenarios):
                       for count, whole in zip(counts, (good, good, bad, bad))]
             rows.append(["{}, {}".format(scenario, model), "{:.0f}".format(good + bad),
                          percent(common.number(c, "correct"))] + shares)
+    rows += [["*printed: {}*".format(log), "{}".format(values[0])] + [percent(share) for share in values[1:]]
+             for log, values in PAPER_TABLE_1.items()]
     return header, rows
 
 
+def row_of_table_2(scenario, name, t, base):
+    """A row; `base`: what the change is against, None: nothing."""
+    return [scenario, name, spread(t, "position"), change(t, base, "position_mean_m") if base else "",
+            cell(t, "position_max_m", digits=1), spread(t, "heading", DEGREES),
+            change(t, base, "heading_mean_rad") if base else ""]
+
+
 def table_2(scenarios):
-    """Errors of the Gaussian UKF with each model's covariances; the changes are against the conventional ones."""
+    """Errors of the Gaussian UKF with each model's covariances, changes against the conventional ones of the setting;
+    the paper's own in italics."""
     header = ("scenario", "covariances", "position, m", "change", "max, m", "orientation, deg", "change")
     rows = []
     for scenario, content in scenarios.items():
-        base = content["trajectory"].get("conventional")
+        trajectories = content["trajectory"]
         for name in ("odometry",) + MODELS:
-            t = content["trajectory"].get(name)
-            if not t:
+            if name not in trajectories:
                 continue
-            is_improved = name in CLASSIFYING
-            rows.append([scenario, name if name != "odometry" else "odometry alone", spread(t, "position"),
-                         change(t, base, "position_mean_m") if is_improved else "", cell(t, "position_max_m", digits=1),
-                         spread(t, "heading", DEGREES),
-                         change(t, base, "heading_mean_rad") if is_improved else ""])
+            base = trajectories[base_of(name)] if name in CLASSIFYING else None
+            rows.append(row_of_table_2(scenario, "odometry alone" if name == "odometry" else name, trajectories[name],
+                                       base))
+    for log, values in PAPER_TABLE_2.items():
+        printed = {name: dict(zip(TABLE_2_KEYS, row)) for name, row in values.items()}
+        for name, t in printed.items():
+            base = printed["conventional"] if name == "paper" else None
+            rows.append(row_of_table_2("*printed: {}*".format(log), name, t, base))
     return header, rows
 
 
@@ -117,7 +150,7 @@ def table_student_t(scenarios):
     header = ("scenario", "covariances", "position, m", "orientation, deg")
     rows = []
     for scenario, content in scenarios.items():
-        for model in MODELS:
+        for model in OURS:
             robust = content["trajectory_student_t"].get(model, {})
             rows.append([scenario, model, spread(robust, "position"), spread(robust, "heading", DEGREES)])
     return header, rows
@@ -125,9 +158,10 @@ def table_student_t(scenarios):
 
 def table_nees(scenarios):
     """NEES of the fix error over its expectation."""
-    header = ("scenario", "claimed by the receiver") + MODELS
+    models = tuple(m for m in MODELS if any(m in content["fix_nees"] for content in scenarios.values()))
+    header = ("scenario", "claimed by the receiver") + models
     rows = [[scenario] + [cell(content, "fix_nees", name, "mean", scale=1.0 / EXPECTED_NEES)
-                          for name in ("claimed",) + MODELS]
+                          for name in ("claimed",) + models]
             for scenario, content in scenarios.items()]
     return header, rows
 
@@ -156,7 +190,7 @@ def tables_of(scenarios):
     """The tables for which there is something, with their titles."""
     candidates = (
         ("classification", "Table I: good and bad fixes, told apart at {:g} m".format(BAD_FIX_M), table_1),
-        ("trajectory", "Table II: errors of the Gaussian UKF; change: against the conventional covariances", table_2),
+        ("trajectory", "Table II: errors of the UKF; change: against the setting's conventional model", table_2),
         ("trajectory_student_t", "Errors of the Student-t UKF", table_student_t),
         ("fix_nees", "Mean NEES of the fixes' errors over its expectation", table_nees),
         ("fixes", "What the models say of the fixes", table_fixes),
@@ -171,91 +205,100 @@ def markdown(header, rows):
     return "\n".join(lines + ["| " + " | ".join(row) + " |" for row in rows]) + "\n"
 
 
+def models_in(fixes):
+    """The models that weighed the fixes: of a bag perhaps not all."""
+    return [m for m in MODELS if any(np.isfinite(rows["sigma_" + m]).any() for rows in fixes.values())]
+
+
+def settings_of(models):
+    """The settings with those of their models that are there."""
+    settings = {setting: [m for m in those if m in models] for setting, those in SETTINGS.items()}
+    return {setting: those for setting, those in settings.items() if those}
+
+
 def plot_figure5(path, fixes):
-    """Error of the fixes against the models' standard deviations over time, a panel per scenario."""
-    figure, panels = plt.subplots(len(fixes), 1, figsize=(10.5, 2.3 * len(fixes)), squeeze=False)
-    for axes, (scenario, rows) in zip(panels[:, 0], fixes.items()):
-        axes.fill_between(rows["t"], 0.0, rows["error"], color="#c9d3ea", linewidth=0)
-        axes.plot(rows["t"], rows["error"], color=ERROR_COLOUR, linewidth=0.9, label="error of the fix")
-        for model, style in (("conventional", "-"), ("paper", ":"), ("soft", "-")):
-            if not np.isfinite(rows["sigma_" + model]).any():
-                continue
-            axes.plot(rows["t"], np.minimum(rows["sigma_" + model], SIGMA_CROP_M), style, linewidth=1.2,
-                      color=MODEL_COLOURS[model], label="σ {}".format(model))
-        axes.axhline(BAD_FIX_M, color="#888888", linewidth=0.7, linestyle="--")
-        axes.set_ylim(0.0, SIGMA_CROP_M * 1.05)
-        if len(rows):
-            axes.set_xlim(rows["t"][0], rows["t"][-1])
-        axes.set_ylabel("m")
-        axes.set_title(scenario, fontsize=10, loc="left")
-        common.light_grid(axes)
-    panels[-1, 0].set_xlabel("time [s]")
-    common.legend_beside(panels[0, 0])
-    figure.subplots_adjust(hspace=0.45)
+    """Error of the fixes and the models' standard deviations over time: a row per scenario, a column per setting."""
+    settings = settings_of(models_in(fixes))
+    figure, panels = plt.subplots(len(fixes), len(settings), figsize=(12.0, 2.3 * len(fixes)), squeeze=False,
+                                  sharey=True)
+    for row, (scenario, rows) in zip(panels, fixes.items()):
+        for axes, (setting, models) in zip(row, settings.items()):
+            axes.fill_between(rows["t"], 0.0, rows["error"], color="#c9d3ea", linewidth=0)
+            axes.plot(rows["t"], rows["error"], color=ERROR_COLOUR, linewidth=0.9, label="error of the fix")
+            for model in models:
+                axes.plot(rows["t"], np.minimum(rows["sigma_" + model], SIGMA_CROP_M), linewidth=1.2,
+                          linestyle=":" if model == "paper" else "-", color=colour_of(model),
+                          label="σ " + model.replace(AS_PRINTED, ""))
+            axes.axhline(BAD_FIX_M, color="#888888", linewidth=0.7, linestyle="--")
+            axes.set_ylim(0.0, SIGMA_CROP_M * 1.05)
+            if len(rows):
+                axes.set_xlim(rows["t"][0], rows["t"][-1])
+            axes.set_title("{}, {}".format(scenario, setting), fontsize=10, loc="left")
+            common.light_grid(axes)
+        row[0].set_ylabel("m")
+    for axes in panels[-1]:
+        axes.set_xlabel("time [s]")
+    common.legend_beside(panels[0, -1], handles=panels[0, 0].get_legend_handles_labels()[0])
+    figure.subplots_adjust(hspace=0.45, wspace=0.06)
     common.save_figure(figure, path)
 
 
-def map_panels(truths):
-    """A figure with an axes of equal scales for each scenario, two a row; of an odd number the flattest has its own."""
-    panel_width, panel_height, least_height, margin = 5.6, 3.9, 1.8, 0.8  # inches
-    flatness = {s: np.ptp(t["x"]) / max(np.ptp(t["y"]), 1.0) if len(t) else 1.0 for s, t in truths.items()}
-    alone = [max(flatness, key=flatness.get)] if len(truths) % 2 else []
-    paired = [s for s in truths if s not in alone]
-    rows = [paired[k:k + 2] for k in range(0, len(paired), 2)] + ([alone] if alone else [])
-    heights = [margin + np.clip(max(2.0 * panel_width / len(row) / flatness[s] for s in row), least_height, panel_height)
-               for row in rows]
-    figure = plt.figure(figsize=(2.0 * panel_width, sum(heights)), constrained_layout=True)
-    grid = figure.add_gridspec(len(heights), 2, height_ratios=heights)
-    panels = {s: figure.add_subplot(grid[k // 2, k % 2]) for k, s in enumerate(paired)}
-    panels.update({s: figure.add_subplot(grid[-1, :]) for s in alone})
-    for scenario, axes in panels.items():
-        axes.set_aspect("equal", adjustable="datalim")  # fills its place, however flat the drive
-        axes.set_title(scenario, fontsize=10, loc="left")
+def map_panels(truths, columns, width):
+    """A figure with maps of equal scales, a row for each scenario; axes by scenario and column. `width`: of one, in."""
+    margin, tallest = 0.5, 4.0  # inches
+    tall = {s: np.ptp(t["y"]) / max(np.ptp(t["x"]), 1.0) if len(t) else 1.0 for s, t in truths.items()}
+    heights = [margin + min(tallest, max(width * tall[s], 1.2)) for s in truths]
+    figure, panels = plt.subplots(len(truths), len(columns), figsize=(width * len(columns), sum(heights)),
+                                  squeeze=False, sharex="row", sharey="row", constrained_layout=True,
+                                  gridspec_kw={"height_ratios": heights})
+    by_place = {}
+    for row, (scenario, truth) in zip(panels, truths.items()):
+        for axes, column in zip(row, columns):
+            axes.set_aspect("equal")
+            axes.set_title("{}, {}".format(scenario, column), fontsize=9, loc="left")
+            if len(truth):
+                axes.plot(truth["x"], truth["y"], color="#f0c000", linewidth=2.5, zorder=1, label="true trajectory")
+            common.light_grid(axes)
+            by_place[scenario, column] = axes
+        row[0].set_ylabel("north [m]")
+    for axes in panels[-1]:
         axes.set_xlabel("east [m]")
-        axes.set_ylabel("north [m]")
-        common.light_grid(axes)
-    return figure, panels
-
-
-def draw_truth(axes, truth, width):
-    """The true trajectory, where it is known."""
-    if len(truth):
-        axes.plot(truth["x"], truth["y"], color="#f0c000", linewidth=width, zorder=1, label="true trajectory")
+    return figure, by_place
 
 
 def plot_figure6(path, fixes, truths):
-    """The fixes, green where the soft model calls them good and red where bad, on the true trajectory. Of a bag without
-    the soft model, the last that it has.
-    """
-    figure, panels = map_panels({s: truths[s] for s in fixes})
-    for scenario, axes in panels.items():
+    """The fixes, green where a model calls them good and red where bad, on the true trajectory; a column per model."""
+    figure, panels = map_panels({s: truths[s] for s in fixes}, models_in(fixes), 3.2)
+    for (scenario, model), axes in panels.items():
         rows = fixes[scenario]
-        model = next(m for m in reversed(MODELS) if np.isfinite(rows["sigma_" + m]).any())
-        draw_truth(axes, truths[scenario], 2.5)
         for good, colour, label in ((1, GOOD_COLOUR, "called good"), (0, BAD_COLOUR, "called bad")):
             chosen = rows["good_" + model] == good
-            axes.plot(rows["x"][chosen], rows["y"][chosen], ".", color=colour, markersize=2.5, zorder=3 - good,
+            axes.plot(rows["x"][chosen], rows["y"][chosen], ".", color=colour, markersize=2.0, zorder=3 - good,
                       label=label)
-    legend = next(iter(panels.values())).legend(fontsize=8, loc="best")
+    legend = next(iter(panels.values())).legend(fontsize=7, loc="best")
     for handle in legend.get_lines():
         handle.set_markersize(8)
     common.save_figure(figure, path)
 
 
 def plot_figure7(path, truths, estimates):
-    """The trajectories of the UKF with the conventional and the soft covariances."""
-    figure, panels = map_panels(truths)
-    for scenario, axes in panels.items():
-        draw_truth(axes, truths[scenario], 3.0)
-        for model in ("conventional", "paper", "soft"):
+    """The trajectories of the UKF with each model's covariances; a column per setting."""
+    settings = settings_of([m for m in MODELS if any(len(estimates[s][m]) for s in truths)])
+    figure, panels = map_panels(truths, list(settings), 5.6)
+    for (scenario, setting), axes in panels.items():
+        for model in settings[setting]:
             rows = estimates[scenario][model]
-            if len(rows):
-                axes.plot(rows["x"], rows["y"], color=MODEL_COLOURS[model], linewidth=1.0, label=model)
+            axes.plot(rows["x"], rows["y"], color=colour_of(model), linewidth=1.0, label=model.replace(AS_PRINTED, ""))
     next(iter(panels.values())).legend(fontsize=8, loc="best")
     common.save_figure(figure, path)
 
 
-MODEL_COLOURS = common.method_colours(MODELS)
+def colour_of(model):
+    """The same in both settings."""
+    return MODEL_COLOURS[model.replace(AS_PRINTED, "")]
+
+
+MODEL_COLOURS = common.method_colours(OURS)
 
 
 def make_report(out):
@@ -289,7 +332,7 @@ def make_report(out):
     page.heading("Figures")
     page.image("fig5.png", "As figure 5: error of the fixes and standard deviations of the models, cut at "
                "{:g} m; dashed: {:g} m, from which a fix is bad.".format(SIGMA_CROP_M, BAD_FIX_M))
-    page.image("fig6.png", "As figure 6: fixes that the soft model calls good (green) and bad (red).")
+    page.image("fig6.png", "As figure 6: fixes that each model calls good (green) and bad (red).")
     page.image("fig7.png", "As figure 7: the UKF's trajectories with each model's covariances.")
     page.provenance(metrics, ("scenarios",))
     with open(os.path.join(out, "tables.md"), "w", encoding="utf-8") as stream:

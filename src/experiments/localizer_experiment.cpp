@@ -9,6 +9,7 @@
 #include "urban_gnss_localization/experiments/faulty_participant.hpp"
 #include "urban_gnss_localization/geometry/isometry.hpp"
 #include "urban_gnss_localization/geometry/local_frame.hpp"
+#include "urban_gnss_localization/localizers/nishida/particle_filter.hpp"
 #include "urban_gnss_localization/pipeline/bias_responder.hpp"
 
 namespace urban_gnss {
@@ -18,7 +19,8 @@ constexpr Stamp kHealthInterval = std::chrono::milliseconds(100);
 
 /// The bias filter is as printed where the localizer is.
 GpsBiasParameters bias_of(GpsBiasParameters bias, const Localizer& localizer) {
-  if (localizer.mode() == enum_name(ParticleFilterMode::kLiteral)) bias.mode = ParticleFilterMode::kLiteral;
+  const auto* filter = dynamic_cast<const ParticleFilter*>(&localizer);
+  if (filter != nullptr && filter->filter_mode() == ParticleFilterMode::kLiteral) bias.mode = filter->filter_mode();
   return bias;
 }
 

@@ -19,12 +19,17 @@ constexpr Stamp kOdometryGap = std::chrono::seconds(1);
 /// A covariance model with the filters that use its covariances.
 class Contestant {
  public:
-  Contestant(CovarianceModel model, const Scenario& scenario, const OcclusionExperimentConditions& conditions,
+  Contestant(const ComparedModel& compared, const Scenario& scenario, const OcclusionExperimentConditions& conditions,
              OcclusionModelRun& run)
-      : frame_(scenario.datum), covariance_(with_model(conditions.occlusion.covariance, model)), run_(run) {
+      : frame_(scenario.datum), covariance_(parameters_of(compared, conditions)), run_(run) {
+    if (compared.is_as_printed) {
+      filters_.push_back(make_filter(scenario, conditions, as_printed(conditions.ukf)));
+      return;
+    }
     UkfParameters robust = conditions.ukf;
     robust.outliers = OutlierPolicy::kStudentT;
-    filters_ = {make_filter(scenario, conditions, conditions.ukf), make_filter(scenario, conditions, robust)};
+    filters_.push_back(make_filter(scenario, conditions, conditions.ukf));
+    filters_.push_back(make_filter(scenario, conditions, robust));
   }
 
   void add_odometry(const OdometrySample& sample) {
@@ -56,8 +61,11 @@ class Contestant {
   const std::optional<WorldAlignment>& alignment() const { return alignment_; }
 
  private:
-  static GnssCovarianceParameters with_model(GnssCovarianceParameters parameters, CovarianceModel model) {
-    parameters.model = model;
+  static GnssCovarianceParameters parameters_of(const ComparedModel& compared,
+                                                const OcclusionExperimentConditions& conditions) {
+    GnssCovarianceParameters parameters =
+        compared.is_as_printed ? as_printed(conditions.as_printed).covariance : conditions.occlusion.covariance;
+    parameters.model = compared.model;
     return parameters;
   }
 
@@ -88,19 +96,20 @@ class Contestant {
   LocalFrame frame_;
   GnssCovarianceModel covariance_;
   OcclusionModelRun& run_;
-  std::array<std::unique_ptr<LocalizationPipeline>, 2> filters_;  ///< as in the conditions, and the robust one
+  std::vector<std::unique_ptr<LocalizationPipeline>> filters_;  ///< as in the conditions, and the robust one
   std::optional<WorldAlignment> alignment_;
 };
 
-/// The map and the sky, which all contestants share.
-class Experiment : public DriveParticipant {
+/// A setting: the map and the sky, which its contestants share.
+class Setting : public DriveParticipant {
  public:
-  Experiment(const Scenario& scenario, const OcclusionExperimentConditions& conditions, OcclusionRun& run)
-      : blocked_threshold_(conditions.occlusion.covariance.blocked_threshold),
-        run_(run),
-        occlusion_(conditions.occlusion) {
+  Setting(bool is_as_printed, const Scenario& scenario, const OcclusionExperimentConditions& conditions,
+          OcclusionRun& run)
+      : tally_(run.satellites[is_as_printed ? 1 : 0]),
+        occlusion_(is_as_printed ? as_printed(conditions.as_printed) : conditions.occlusion) {
     occlusion_.set_antenna(scenario.vehicle.antenna());
     for (std::size_t i = 0; i < kComparedModels.size(); ++i) {
+      if (kComparedModels[i].is_as_printed != is_as_printed) continue;
       contestants_.push_back(std::make_unique<Contestant>(kComparedModels[i], scenario, conditions, run.models[i]));
     }
   }
@@ -132,7 +141,6 @@ class Experiment : public DriveParticipant {
 
  private:
   void take_heading() {
-    static_assert(kComparedModels.back() == CovarianceModel::kSoft);
     if (contestants_.back()->alignment()) occlusion_.set_alignment(*contestants_.back()->alignment());
   }
 
@@ -141,13 +149,13 @@ class Experiment : public DriveParticipant {
       const SatelliteObservation& satellite = assessment.satellites[i];
       if (!assessment.covariance.satellites[i].is_used || !std::isfinite(satellite.blocked_fraction)) continue;
       const std::size_t truth = has_line_of_sight[i] ? 1 : 0;
-      ++run_.satellites.counts[truth][satellite.blocked_fraction < blocked_threshold_ ? 1 : 0];
-      run_.satellites.known_sum[truth] += satellite.known_fraction;
+      const double threshold = occlusion_.parameters().covariance.blocked_threshold;
+      ++tally_.counts[truth][satellite.blocked_fraction < threshold ? 1 : 0];
+      tally_.known_sum[truth] += satellite.known_fraction;
     }
   }
 
-  double blocked_threshold_;
-  OcclusionRun& run_;
+  LineOfSightTally& tally_;
   OcclusionPipeline occlusion_;
   std::vector<std::unique_ptr<Contestant>> contestants_;
 };
@@ -170,8 +178,9 @@ Trajectory odometry_from(Stamp start, const DriveRecord& record) {
 OcclusionRun run_occlusion_experiment(const Scenario& scenario, const OcclusionExperimentConditions& conditions,
                                       const std::function<void(double)>& on_progress) {
   OcclusionRun run;
-  Experiment experiment(scenario, conditions, run);
-  const DriveRecord record = drive_city(scenario, conditions.cloud_every, {&experiment}, on_progress);
+  Setting ours(false, scenario, conditions, run);
+  Setting printed(true, scenario, conditions, run);
+  const DriveRecord record = drive_city(scenario, conditions.cloud_every, {&ours, &printed}, on_progress);
   run.truth = record.truth;
   const Trajectory& conventional = run.models.front().estimate;
   if (!conventional.empty()) run.odometry = odometry_from(conventional.front().stamp, record);

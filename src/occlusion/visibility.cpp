@@ -47,7 +47,8 @@ SatelliteVisibility assess_visibility(const RayTracer& tracer, const ObservedSpa
       const LookAngles ray{look.azimuth_rad + a * azimuth_sigma,
                            std::clamp(look.elevation_rad + e * rounding_sigma, 0.0, 0.5 * kPi)};
       const Eigen::Vector3d towards = direction(ray, antenna.east_yaw_rad);
-      const RayOutcome outcome = tracer.trace(origin, towards);
+      const bool is_central = a == 0.0 && ray.elevation_rad == look.elevation_rad;
+      const RayOutcome outcome = is_central ? ahead : tracer.trace(origin, towards);
       const double share =
           outcome.blocked ? 1.0 : std::min(1.0, outcome.vegetation_m / sampling.parameters.permeable_loss);
       blocked += share;

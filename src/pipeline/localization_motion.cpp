@@ -46,7 +46,7 @@ void LocalizationPipeline::add_odometry(const OdometrySample& message) {
   if (initialized() && elapsed_s > 0.0) {
     localizer_->move(twist, elapsed_s);
     const MotionDoubt doubt{speed_.doubt_m2(), yaw_rate_.doubt_rad2()};
-    if (doubt.exists()) localizer_->doubt(doubt);
+    if (doubt.exists()) doubt_motion(doubt);
     guard_against_non_finite();
   }
   if (!initialized() && start_.given() && frame()) start_from(told(*start_.given(), "the given pose"));
@@ -55,13 +55,17 @@ void LocalizationPipeline::add_odometry(const OdometrySample& message) {
   if (initialized()) outputs_.push_back({sample.stamp, estimate(), sample.pose, twist});
 }
 
+void LocalizationPipeline::doubt_motion(const MotionDoubt& doubt) {
+  if (!localizer_->is_as_printed()) localizer_->doubt(doubt);
+}
+
 void LocalizationPipeline::change_odometry() {
   speed_.expect_jump();
   delay_.forget_odometry();
   const MotionDoubt doubt = odometry_.doubt();
   if (!doubt.exists()) return;
   if (initialized()) {
-    localizer_->doubt(doubt);
+    doubt_motion(doubt);
   } else {
     start_.lose_place();  // what was found until now is of another motion
   }
@@ -70,7 +74,7 @@ void LocalizationPipeline::change_odometry() {
 void LocalizationPipeline::change_yaw_rate() {
   delay_.forget_odometry();
   if (initialized()) {
-    localizer_->doubt({0.0, kWrongTurns_rad * kWrongTurns_rad});
+    doubt_motion({0.0, kWrongTurns_rad * kWrongTurns_rad});
   } else {
     start_.lose_place();  // what was found until now is of other turns
   }

@@ -14,6 +14,10 @@ void append(std::string& text, const std::string& more) { text += (text.empty() 
 
 }  // namespace
 
+EnumNames<OcclusionMode> enum_names(OcclusionMode) {
+  return {{"standard", OcclusionMode::kStandard}, {"as_printed", OcclusionMode::kAsPrinted}};
+}
+
 EnumNames<TracerChoice> enum_names(TracerChoice) {
   return {{"voxel", TracerChoice::kVoxel}, {"kdtree", TracerChoice::kKdTree}};
 }
@@ -32,15 +36,24 @@ void OcclusionParameters::check(std::vector<std::string>& faults) const {
   if (antenna_offset.size() != 3) faults.push_back("antenna_offset: must be x, y and z (m)");
 }
 
+OcclusionPipelineParameters as_printed(OcclusionPipelineParameters parameters) {
+  parameters.occlusion.mode = OcclusionMode::kAsPrinted;
+  parameters.occlusion.tracer = TracerChoice::kKdTree;
+  parameters.visibility.azimuth_samples = parameters.visibility.elevation_samples = 1;
+  parameters.covariance.model = CovarianceModel::kPaper;
+  parameters.covariance.allow_smaller = true;
+  return parameters;
+}
+
 OcclusionPipeline::OcclusionPipeline(const OcclusionPipelineParameters& parameters)
-    : parameters_(parameters),
-      local_map_(parameters.local_map, parameters.voxels, parameters.aligner),
-      voxel_tracer_(local_map_.map(), parameters.voxel_tracer),
-      sampling_(parameters.visibility),
-      covariance_(parameters.covariance),
-      consistency_(parameters.consistency),
-      antenna_in_base_(parameters.occlusion.antenna_offset[0], parameters.occlusion.antenna_offset[1],
-                       parameters.occlusion.antenna_offset[2]) {}
+    : parameters_(parameters.occlusion.mode == OcclusionMode::kAsPrinted ? as_printed(parameters) : parameters),
+      local_map_(parameters_.local_map, parameters_.voxels, parameters_.aligner),
+      voxel_tracer_(local_map_.map(), parameters_.voxel_tracer),
+      sampling_(parameters_.visibility),
+      covariance_(parameters_.covariance),
+      consistency_(parameters_.consistency),
+      antenna_in_base_(parameters_.occlusion.antenna_offset[0], parameters_.occlusion.antenna_offset[1],
+                       parameters_.occlusion.antenna_offset[2]) {}
 
 CloudOutcome OcclusionPipeline::add_cloud(Stamp stamp, const PointCloud& cloud, const Eigen::Isometry3d& sensor_in_base,
                                           const Eigen::Isometry3d& base_in_odom) {
@@ -95,10 +108,7 @@ const SatelliteEpoch* OcclusionPipeline::satellites_for(Stamp fix) const {
 const RayTracer& OcclusionPipeline::tracer() const {
   if (parameters_.occlusion.tracer == TracerChoice::kVoxel) return voxel_tracer_;
   if (!kd_tracer_) {
-    KdTreeRayTracerParameters parameters;
-    parameters.min_range = parameters_.voxel_tracer.min_range;
-    parameters.max_range = parameters_.voxel_tracer.max_range;
-    kd_tracer_ = std::make_unique<KdTreeRayTracer>(local_map_.map().points(), parameters);
+    kd_tracer_ = std::make_unique<KdTreeRayTracer>(local_map_.map().points(), parameters_.kdtree_tracer);
   }
   return *kd_tracer_;
 }

@@ -1,5 +1,5 @@
-// Tables I and II of Maier and Kleiner (2010) on simulated scenarios: how well each covariance model tells good fixes
-// from bad ones, and what a UKF makes of its covariances.
+// Tables I and II of Maier and Kleiner (2010) on simulated scenarios, in our setting and in theirs: how well each
+// covariance model tells good fixes from bad ones, and what a UKF makes of its covariances.
 
 #include "urban_gnss_localization/experiments/occlusion_experiment.hpp"
 
@@ -47,6 +47,7 @@ OcclusionExperimentConditions read_conditions(const Options& options) {
                                ? (package_path() / "config/occlusion_simulator.yaml").string()
                                : options.occlusion_file;
   read_overrides(file + ", --set", load_map(file), options.occlusion_overrides, conditions.occlusion);
+  read_overrides("--set", YAML::Node(YAML::NodeType::Map), options.occlusion_overrides, conditions.as_printed);
   WithMotion with_motion{conditions.ukf, conditions.motion};
   read_overrides("--ukf-set", YAML::Node(YAML::NodeType::Map), options.ukf_overrides, with_motion,
                  conditions.localization);
@@ -84,13 +85,14 @@ nlohmann::json classification_json(const std::vector<OcclusionRun>& runs, std::s
           {"with_map", number_or_null(ratio(with_map, good + bad))}};
 }
 
-/// Share of satellites of which the map says the truth, by whether they have a line of sight.
-nlohmann::json satellites_json(const std::vector<OcclusionRun>& runs) {
+/// Share of satellites of which the setting's map says the truth, by whether they have a line of sight.
+nlohmann::json satellites_json(const std::vector<OcclusionRun>& runs, std::size_t setting) {
   LineOfSightTally all;
   for (const OcclusionRun& run : runs) {
     for (const std::size_t truth : {0U, 1U}) {
-      for (const std::size_t said : {0U, 1U}) all.counts[truth][said] += run.satellites.counts[truth][said];
-      all.known_sum[truth] += run.satellites.known_sum[truth];
+      const LineOfSightTally& tally = run.satellites[setting];
+      for (const std::size_t said : {0U, 1U}) all.counts[truth][said] += tally.counts[truth][said];
+      all.known_sum[truth] += tally.known_sum[truth];
     }
   }
   const auto direct = static_cast<double>(all.count(true));
@@ -164,16 +166,19 @@ nlohmann::json scenario_json(const std::vector<OcclusionRun>& runs) {
                          {"p95", number_or_null(error.p95)},
                          {"max", number_or_null(error.max)}};
   for (std::size_t i = 0; i < kComparedModels.size(); ++i) {
-    const std::string name = enum_name(kComparedModels[i]);
+    const std::string name = kComparedModels[i].name;
     json["fix_nees"][name] = fix_json(runs, i, false);
     json["trajectory"][name] =
         trajectory_json(runs, [i](const OcclusionRun& run) -> const Trajectory& { return run.models[i].estimate; });
+    if (kComparedModels[i].model != CovarianceModel::kConventional) {
+      json["classification"][name] = classification_json(runs, i);
+    }
+    if (kComparedModels[i].is_as_printed) continue;
     json["trajectory_student_t"][name] = trajectory_json(
         runs, [i](const OcclusionRun& run) -> const Trajectory& { return run.models[i].robust_estimate; });
-    if (kComparedModels[i] == CovarianceModel::kConventional) continue;
-    json["classification"][name] = classification_json(runs, i);
   }
-  json["satellites"] = satellites_json(runs);
+  json["satellites"] = satellites_json(runs, 0);
+  json["satellites_as_printed"] = satellites_json(runs, 1);
   return json;
 }
 
@@ -189,12 +194,14 @@ void print(const std::string& scenario, const nlohmann::json& json) {
   std::cout << "\n== " << scenario << ": fix error mean " << text_of(error["mean"], 1, 2) << " m, median "
             << text_of(error["median"], 1, 2) << ", 95 % " << text_of(error["p95"], 1, 2) << ", max "
             << text_of(error["max"], 1, 1) << '\n';
-  std::cout << "Table I        correct  of good  of bad   good>good  good>bad  bad>good   bad>bad   with map   "
-               "satellites: direct>free  hidden>blocked  known direct/hidden\n";
-  for (const char* name : {"paper", "soft"}) {
-    const auto& c = json["classification"][name];
-    const auto& s = json["satellites"];
-    std::cout << std::left << std::setw(13) << name << std::right << std::setw(7) << text_of(c["correct"], 100, 1)
+  std::cout
+      << "Table I                  correct  of good  of bad   good>good  good>bad  bad>good   bad>bad   with map   "
+         "satellites: direct>free  hidden>blocked  known direct/hidden\n";
+  for (const ComparedModel& each : kComparedModels) {
+    if (each.model == CovarianceModel::kConventional) continue;
+    const auto& c = json["classification"][each.name];
+    const auto& s = json[each.is_as_printed ? "satellites_as_printed" : "satellites"];
+    std::cout << std::left << std::setw(23) << each.name << std::right << std::setw(7) << text_of(c["correct"], 100, 1)
               << " %" << std::setw(7) << text_of(c["correct_of_good"], 100, 1) << " %" << std::setw(6)
               << text_of(c["correct_of_bad"], 100, 1) << " %";
     for (const char* count : {"good_called_good", "good_called_bad", "bad_called_good", "bad_called_bad"})
@@ -204,10 +211,12 @@ void print(const std::string& scenario, const nlohmann::json& json) {
               << text_of(s["hidden_called_blocked"], 100, 1) << " %   " << text_of(s["known_of_direct"], 1, 2) << " / "
               << text_of(s["known_of_hidden"], 1, 2) << '\n';
   }
-  std::cout
-      << "Table II       position, m      max     orientation, deg   coverage   fix NEES (2): mean, of good, of bad\n";
-  for (const char* name : {"odometry", "claimed", "conventional", "paper", "soft"}) {
-    std::cout << std::left << std::setw(13) << name << std::right;
+  std::cout << "Table II                 position, m      max     orientation, deg   coverage   fix NEES (2): mean, of "
+               "good, of bad\n";
+  std::vector<std::string> rows{"odometry", "claimed"};
+  for (const ComparedModel& each : kComparedModels) rows.emplace_back(each.name);
+  for (const std::string& name : rows) {
+    std::cout << std::left << std::setw(23) << name << std::right;
     if (json["trajectory"].contains(name)) {
       const auto& t = json["trajectory"][name];
       std::cout << std::setw(8) << text_of(t["position_mean_m"], 1, 2) << " +- " << std::setw(5)

@@ -31,9 +31,7 @@ inline void write_series(const std::filesystem::path& directory, const std::stri
   const Stamp start = run.truth.front().stamp;
   write_file(directory / ("fixes_" + scenario + ".csv"), [&](std::ostream& out) {
     out << "t,x,y,error,sigma_claimed";
-    for (const CovarianceModel model : kComparedModels) {
-      out << ",sigma_" << enum_name(model) << ",good_" << enum_name(model);
-    }
+    for (const ComparedModel& each : kComparedModels) out << ",sigma_" << each.name << ",good_" << each.name;
     out << '\n';
     const std::vector<WeighedFix>& fixes = run.models.front().fixes;
     for (std::size_t i = 0; i < fixes.size(); ++i) {
@@ -50,7 +48,7 @@ inline void write_series(const std::filesystem::path& directory, const std::stri
   };
   write("truth", run.truth);
   write("odometry", run.odometry);
-  for (std::size_t i = 0; i < kComparedModels.size(); ++i) write(enum_name(kComparedModels[i]), run.models[i].estimate);
+  for (std::size_t i = 0; i < kComparedModels.size(); ++i) write(kComparedModels[i].name, run.models[i].estimate);
 }
 
 }  // namespace urban_gnss

@@ -6,6 +6,7 @@
 #include "urban_gnss_localization/experiments/localizer_experiment.hpp"
 #include "urban_gnss_localization/localizers/kim/complementary_ekf.hpp"
 #include "urban_gnss_localization/localizers/maier/ukf.hpp"
+#include "urban_gnss_localization/localizers/nishida/particle_filter.hpp"
 
 namespace urban_gnss {
 namespace {
@@ -95,6 +96,22 @@ TEST(LocalizerExperiment, ContendersHaveTheSameDriveAndDoNotDisturbEachOther) {
   EXPECT_LT(summary.position_m.rmse, 5.0);
   EXPECT_GT(summary.coverage, 0.5);
   EXPECT_TRUE(both.outages.empty());
+}
+
+TEST(LocalizerExperiment, TheBiasFilterIsAsPrintedWhereTheLocalizerIs) {
+  const auto last_x = [](ParticleFilterMode of_filter, ParticleFilterMode of_bias) {
+    ParticleFilterParameters parameters;
+    parameters.mode = of_filter;
+    parameters.particle_count = 200;
+    const Contender contender{"contender",
+                              [&] { return std::make_unique<ParticleFilter>(parameters, MotionParameters{}); }};
+    LocalizerExperimentConditions conditions;
+    conditions.bias.mode = of_bias;
+    return run_localizer_experiment(airfield(30.0), {contender}, conditions, [](double) {}).estimates[0].back().pose.x;
+  };
+  using Mode = ParticleFilterMode;
+  EXPECT_EQ(last_x(Mode::kLiteral, Mode::kPaper), last_x(Mode::kLiteral, Mode::kLiteral));
+  EXPECT_NE(last_x(Mode::kPaper, Mode::kPaper), last_x(Mode::kPaper, Mode::kLiteral));
 }
 
 TEST(LocalizerExperiment, AReceiverThatDeclaresNoCovarianceIsGivenTheDefault) {

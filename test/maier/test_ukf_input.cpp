@@ -196,7 +196,8 @@ TEST(UkfInput, EveryParameterHasAnEffect) {
     auto base = with(UkfParameters(), is_of_gate ? "outliers: gate" : "outliers: student_t");
     base.reacquisition.reacquisition_gap = 4.0;
     if (name == "common_error_max") base.common_error.common_error_min = 0.1;
-    const std::string value = name == "outliers"           ? "none"
+    const std::string value = name == "mode"               ? "as_printed"
+                              : name == "outliers"         ? "none"
                               : name == "gate_probability" ? "0.05"
                               : name == "gate_timeout"     ? "2.0"
                               : name == "ukf_alpha"        ? "0.9"

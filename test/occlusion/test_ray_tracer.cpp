@@ -26,6 +26,7 @@ VoxelMap map_of(const PointCloud& cloud, double spacing_m) {
 
 KdTreeRayTracerParameters kd_tree_parameters_for(double spacing_m) {
   KdTreeRayTracerParameters parameters;
+  parameters.min_range = VoxelRayTracerParameters().min_range;
   parameters.range_step = 0.5 * spacing_m;
   parameters.search_radius = parameters.search_radius_max = 0.75 * spacing_m;
   parameters.search_radius_slope = 0.0;
@@ -282,6 +283,7 @@ TEST(RayTracers, NothingAndNonsenseAreFree) {
 
 TEST(KdTreeRayTracer, RadiusIsLinearAndBounded) {
   KdTreeRayTracerParameters parameters;
+  parameters.min_range = 1.0;
   parameters.range_step = 0.1;
   parameters.search_radius = 0.3;
   parameters.search_radius_slope = 0.02;

@@ -349,6 +349,31 @@ TEST(LocalizationMotion, ATwistOfZeroBesideAPoseThatMovesIsReplaced) {
   EXPECT_TRUE(rig.pipeline.report().healthy) << rig.pipeline.report().reason;
 }
 
+/// What the localizer is told where the receiver's velocity contradicts the wheels, where the pose moves and the twist
+/// does not, or where the IMU turns the other way.
+MotionDoubt doubt_of(const std::string& fault, bool printed) {
+  Rig rig(kGiven);
+  rig.fake->printed = printed;
+  for (int k = 0; k <= 400; ++k) {
+    OdometrySample sample = Rig::odometry(0.1 * k);
+    if (fault == "wheels") sample.twist.speed_mps = 0.0;
+    if (fault == "twist") sample.twist = {};
+    if (fault == "imu") rig.pipeline.add_imu_yaw_rate(sample.stamp, -Rig::kTwist.yaw_rate_radps);
+    rig.pipeline.add_odometry(sample);
+    if (k % 10 != 0) continue;
+    rig.fix(0.1 * k);
+    if (fault == "wheels") rig.pipeline.add_velocity(Rig::velocity(0.1 * k));
+  }
+  return rig.fake->doubted;
+}
+
+TEST(LocalizationMotion, AsPrintedIsToldNoDoubt) {
+  for (const char* fault : {"wheels", "twist", "imu"}) {
+    EXPECT_TRUE(doubt_of(fault, false).exists()) << fault;
+    EXPECT_FALSE(doubt_of(fault, true).exists()) << fault;
+  }
+}
+
 TEST(LocalizationMotion, AContradictionThatNothingResolvesIsNotHealthy) {
   Rig rig(kGiven);
   for (int k = 0; k <= 300; ++k) {

@@ -1,4 +1,5 @@
 #include "pipeline_rig.hpp"
+#include "urban_gnss_localization/gnss/covariance_filter.hpp"
 #include "urban_gnss_localization/localizers/nishida/particle_filter.hpp"
 #include "urban_gnss_localization/localizers/switching/imm_ekf.hpp"
 #include "urban_gnss_localization/localizers/switching/switching_particle_filter.hpp"
@@ -187,6 +188,17 @@ TEST(LocalizationPipeline, NonFiniteCovarianceOrAltitudeIsReplaced) {
   EXPECT_LT((rig.fake->fixes[0].covariance - isotropic(4.0)).norm(), 1e-12);
   EXPECT_TRUE(rig.fake->fixes[0].position.allFinite());
   EXPECT_EQ(rig.pipeline.report().last_fix.decision, FixDecision::kInflated);
+}
+
+// A fix without weight, as Algorithm 3 of Maier and Kleiner makes them, reaches every localizer as it is.
+TEST(LocalizationPipeline, RInfinityIsKept) {
+  Rig rig(kGiven);
+  rig.drive(0.0);
+  rig.pipeline.add_fix(raw_fix(Rig::at(0.5), {1.0, 2.0}, CovarianceFilterParameters().sigma_infinite));
+  rig.drive(1.0);
+  ASSERT_EQ(rig.fake->fixes.size(), 1u);
+  EXPECT_LT((rig.fake->fixes[0].covariance - isotropic(600.0)).norm(), 1e-6);
+  EXPECT_FALSE(rig.pipeline.report().last_fix.covariance_clamped);
 }
 
 TEST(LocalizationPipeline, OutputStampsAscend) {

@@ -59,6 +59,18 @@ class LocalizerExperimentTest(unittest.TestCase):
         self.assertGreater(faults["pose_30m_off"]["ukf"]["worst_m"], 25.0)
         self.assertEqual(len(faults["pose_30m_off"]["ukf"]["by_seed"]), 1)
 
+    def test_as_printed(self):
+        """The UKF of Maier and Kleiner, and their occlusion in front of it, by name and one parameter."""
+        names = ["ukf", "ukf_as_printed", "ukf_as_printed+occlusion"]
+        with tempfile.TemporaryDirectory() as directory:
+            file = os.path.join(directory, "a.json")
+            done = self.run_tool("--scenarios", "building_pass", "--localizers", ",".join(names), "--seeds", "1",
+                                 "--duration", "25", "--set", "occlusion.mode=as_printed", "--json", file)
+            self.assertEqual(done.returncode, 0, done.stdout)
+            with open(file) as stream:
+                errors = json.load(stream)["scenarios"]["building_pass"]
+        self.assertEqual(len({errors[name]["rmse_m"] for name in names}), 3, errors)
+
     def test_refuses(self):
         for arguments, text in ((("--localizers", "kalman"), "kalman"), (("--set", "ukf.student_dov=1"), "student_dov"),
                                 (("--set", "kalman.gain=1"), "SECTION"), (("--set", "gain=1"), "SECTION"),

@@ -37,6 +37,18 @@ class OcclusionReportTest(unittest.TestCase):
                           content["trajectory"]["conventional"]["position_mean_m"], tables)
             self.assertIn("%.1f %%" % (100.0 * content["classification"]["soft"]["correct"]), tables)
             self.assertIn("%.2f" % (0.5 * content["fix_nees"]["soft"]["mean"]), tables)
+            self.assertIn("| building_pass | paper_as_printed | %.2f ±" %
+                          content["trajectory"]["paper_as_printed"]["position_mean_m"], tables)
+            # What the paper prints, which is computed here from its errors.
+            for log, right, position, orientation in (("014", "79.3 %", "-38.5 %", "-27.6 %"),
+                                                      ("042", "73.0 %", "-37.4 %", "-11.8 %"),
+                                                      ("022", "78.7 %", "-21.2 %", "-10.7 %")):
+                rows = [line for line in tables.splitlines() if "*printed: Log " + log in line]
+                self.assertEqual(len(rows), 4)
+                self.assertIn(right, rows[0])
+                self.assertIn("| paper |", rows[3])
+                self.assertIn("| {} |".format(position), rows[3])
+                self.assertIn("| {} |".format(orientation), rows[3])
 
     def test_says_what_is_missing(self):
         with tempfile.TemporaryDirectory() as out:

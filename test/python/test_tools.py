@@ -206,6 +206,18 @@ class ToolTest(unittest.TestCase):
         with open(self.path("b.tum")) as file:
             self.assertNotIn(file.read(), trajectories)
 
+    def test_maier_as_printed(self):
+        """The UKF by the name of comparisons and by the parameter, the same; and another than ours."""
+        write_recording(self.directory)
+        self.succeed("csv_to_bag", self.directory, self.path("in.bag"))
+        for name, arguments in (("a", ["ukf_as_printed", "--output", self.path("a.bag")]),
+                                ("b", ["ukf", "--set", "mode=as_printed"]), ("c", ["ukf"])):
+            self.succeed("replay", self.path("in.bag"), "--tum", self.path(name + ".tum"), "--localizer", *arguments)
+        self.assertTrue(filecmp.cmp(self.path("a.tum"), self.path("b.tum"), shallow=False))
+        self.assertFalse(filecmp.cmp(self.path("a.tum"), self.path("c.tum"), shallow=False))
+        with rosbag.Bag(self.path("a.bag")) as bag:
+            self.assertEqual({status.mode for _, status, _ in bag.read_messages("/status")}, {"as_printed"})
+
     def test_every_fix_gets_its_decision(self):
         """Also where two fixes are decided upon at once, between two messages of slow odometry."""
         write_recording(self.directory)

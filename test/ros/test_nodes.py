@@ -21,7 +21,7 @@ NODES = {
     "ukf_node": (["_outliers:=all", "_expert/ukf_alpha:=0.0"], ["student_t, gate, none", "ukf_alpha = 0"]),
     "gps_bias_node": (["_expert/bias_filter/shadow_sigma:=-1.0", "_expert/bias_filter/bias_input:=residuals", "_gate:=0.5"],
                       ["shadow_sigma = -1", "residual, position", "gate: no such parameter"]),
-    "occlusion_node": (["_expert/voxels/voxel_size:=-1.0", "_model:=best", "_modl:=soft"],
+    "occlusion_node": (["_expert/voxels/voxel_size:=-1.0", "_model:=best", "_modell:=soft"],
                        ["voxel_size = -1", "conventional, paper, soft", "did you mean model?"]),
     "comparison_node": (["_window:=0.0", "_plot_width:=9", "_localizer:=ukf"],
                         ["window = 0", "plot_width = 9", "did you mean localizers?"]),

@@ -13,8 +13,9 @@
 
 namespace urban_gnss {
 
-/// What the comparison of Maier and Kleiner 2010, Tables I and II, depends on, the scenario aside. Where it differs
-/// from the nodes' defaults it follows the paper: the filter is Gaussian and published_ukf(), its yaw rate is
+/// What the comparison of Maier and Kleiner 2010, Tables I and II, depends on, the scenario aside. There are two
+/// settings on the same drive: ours, and the paper's as printed, with as_printed() of map and filter. Where ours
+/// differs from the nodes' defaults it follows the paper: the filter is Gaussian and published_ukf(), its yaw rate is
 /// the IMU's, and the covariances are used as the models give them, also below the receiver's claim.
 struct OcclusionExperimentConditions {
   OcclusionExperimentConditions() {
@@ -23,16 +24,28 @@ struct OcclusionExperimentConditions {
     localization.imu.use_imu_yaw_rate = true;
   }
 
-  OcclusionPipelineParameters occlusion;  ///< model and antenna are replaced
-  UkfParameters ukf = published_ukf();
+  OcclusionPipelineParameters occlusion;   ///< of our setting; model and antenna are replaced
+  OcclusionPipelineParameters as_printed;  ///< likewise, of the paper's
+  UkfParameters ukf = published_ukf();     ///< of our setting; the paper's is as_printed() of it
   MotionParameters motion;
   LocalizationParameters localization;  ///< datum and antenna are replaced by the scenario's
   int cloud_every{5};                   ///< of a spinning lidar's scans, one in so many goes into the maps
 };
 
-/// The models that are compared, in the order of OcclusionRun::models.
-inline constexpr std::array<CovarianceModel, 3> kComparedModels{CovarianceModel::kConventional, CovarianceModel::kPaper,
-                                                                CovarianceModel::kSoft};
+/// A covariance model in one of the settings.
+struct ComparedModel {
+  const char* name;
+  CovarianceModel model;
+  bool is_as_printed;  ///< in the paper's setting
+};
+
+/// What is compared, in the order of OcclusionRun::models. The last one of each setting turns the sky for its setting.
+inline constexpr std::array<ComparedModel, 5> kComparedModels{
+    {{"conventional", CovarianceModel::kConventional, false},
+     {"paper", CovarianceModel::kPaper, false},
+     {"soft", CovarianceModel::kSoft, false},
+     {"conventional_as_printed", CovarianceModel::kConventional, true},
+     {"paper_as_printed", CovarianceModel::kPaper, true}}};
 
 /// A fix as one model weighed it, with the truth about it.
 struct WeighedFix {
@@ -59,21 +72,21 @@ struct LineOfSightTally {
 struct OcclusionModelRun {
   std::vector<WeighedFix> fixes;
   Trajectory estimate;
-  Trajectory robust_estimate;  ///< by the same filter with OutlierPolicy::kStudentT
+  Trajectory robust_estimate;  ///< in our setting: by the same filter with OutlierPolicy::kStudentT
 };
 
 /// One drive through a scenario, every model on the same measurements. All in the scenario's map frame.
 struct OcclusionRun {
   Trajectory truth;
   Trajectory odometry;  ///< alone, from the true pose when the conventional model's filter started
-  LineOfSightTally satellites;
+  std::array<LineOfSightTally, 2> satellites;  ///< in our setting, and as printed
   std::array<OcclusionModelRun, kComparedModels.size()> models;
 };
 
-/// Drives the scenario: an OcclusionPipeline builds the map and says which satellites it hides, each model weighs the
-/// fixes by that, and a UKF and a robust one use its covariances. The soft model's UKF turns the sky for all. Nothing
-/// but the results sees the truth: the filters start from fixes and motion. `on_progress` is told the share done, 0
-/// to 1. Throws what CitySimulator throws.
+/// Drives the scenario. In each setting an OcclusionPipeline builds the map and says which satellites it hides, each
+/// model weighs the fixes by that, and a UKF (in ours also a robust one) uses its covariances. Nothing but the results
+/// sees the truth: the filters start from fixes and motion. `on_progress` is told the share done, 0 to 1. Throws what
+/// CitySimulator throws.
 OcclusionRun run_occlusion_experiment(const Scenario& scenario, const OcclusionExperimentConditions& conditions,
                                       const std::function<void(double)>& on_progress);
 

@@ -15,7 +15,7 @@ namespace urban_gnss {
 struct FixValidationParameters {
   double fix_sigma_default{4.0};
   double fix_sigma_floor{0.3};
-  double fix_sigma_ceiling{200.0};
+  double fix_sigma_ceiling{1000.0};
   double fix_covariance_scale{1.0};
   double max_distance_from_datum{100000.0};
 

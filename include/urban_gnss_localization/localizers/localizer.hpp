@@ -63,8 +63,8 @@ class Localizer {
 
   virtual const char* name() const = 0;
   virtual std::string mode() const = 0;
-  /// Whether it is as its paper prints it. What is ours then keeps out of its estimate: it is not started anew where
-  /// the fixes contradict it, and its covariance is published as it is.
+  /// Whether it is as its paper prints it. The pipeline then keeps what is ours out of its estimate: it is told no
+  /// doubt(), is not started anew where fixes contradict it, and its covariance is published as it is.
   virtual bool is_as_printed() const { return false; }
 
   /// Whether it makes use of a bias filter's radius, so that a fix should wait for it.

@@ -11,9 +11,10 @@
 namespace urban_gnss {
 
 /// Parameters of Algorithm 2. The search radius is bounded and linear in the range r:
-/// min(search_radius + search_radius_slope r, search_radius_max).
+/// min(search_radius + search_radius_slope r, search_radius_max). The paper starts at a range of 0, and has no other
+/// number.
 struct KdTreeRayTracerParameters {
-  double min_range{1.0};
+  double min_range{0.0};
   double max_range{500.0};
   double range_step{0.5};
   double search_radius{0.3};
@@ -24,10 +25,10 @@ struct KdTreeRayTracerParameters {
 
   void visit(ParameterVisitor& v) {
     v("min_range", min_range, non_negative(), "m",
-      "distance from the antenna below which an obstacle is the robot itself");
-    v("max_range", max_range, positive(), "m", "distance up to which a ray is followed");
+      "distance from the antenna below which an obstacle is the robot itself; as printed r starts at 0");
+    v("max_range", max_range, positive(), "m", "distance up to which a ray is followed, r_max");
     v("range_step", range_step, positive(), "m", "step along a ray, r_inc");
-    v("search_radius", search_radius, positive(), "m", "search radius at the antenna");
+    v("search_radius", search_radius, positive(), "m", "search radius at the antenna, r_search at r = 0");
     v("search_radius_slope", search_radius_slope, non_negative(), "",
       "growth of the search radius with range; 0: constant radius");
     v("search_radius_max", search_radius_max, positive(), "m", "greatest search radius");

@@ -120,6 +120,8 @@ class LocalizationPipeline {
   /// Why a message of the stream cannot be used, then.
   std::string far_ahead(InputStream stream) const;
   void forget_odometry(double gap_s);
+  /// Tells the localizer, unless it is as printed.
+  void doubt_motion(const MotionDoubt& doubt);
   /// The odometry is moved by another part of its messages from now on.
   void change_odometry();
   void change_yaw_rate();

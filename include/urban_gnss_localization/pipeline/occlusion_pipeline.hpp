@@ -19,13 +19,21 @@
 
 namespace urban_gnss {
 
+/// How closely section IV of Maier and Kleiner is followed.
+enum class OcclusionMode {
+  kStandard,   ///< as the parameters say
+  kAsPrinted,  ///< as_printed()
+};
+EnumNames<OcclusionMode> enum_names(OcclusionMode);
+
 enum class TracerChoice {
-  kVoxel,   ///< the default
-  kKdTree,  ///< Algorithm 2 as printed; rebuilt from the map where that has changed, slow
+  kVoxel,   ///< ours, the default
+  kKdTree,  ///< Algorithm 2; rebuilt from the map where that has changed, slow
 };
 EnumNames<TracerChoice> enum_names(TracerChoice);
 
 struct OcclusionParameters {
+  OcclusionMode mode{OcclusionMode::kStandard};
   TracerChoice tracer{TracerChoice::kVoxel};
   std::vector<double> antenna_offset{0.0, 0.0, 0.0};
   double antenna_sigma{0.3};
@@ -37,7 +45,10 @@ struct OcclusionParameters {
   double sky_mask{0.17};
 
   void visit(ParameterVisitor& v) {
-    v.basic()("tracer", tracer, "ray tracer; kdtree: Algorithm 2 as printed, slow");
+    v.basic()("mode", mode,
+              "standard: as tracer and model say; as_printed: as Maier and Kleiner print it: tracer kdtree, one ray, "
+              "model paper");
+    v.basic()("tracer", tracer, "ray tracer; voxel: ours; kdtree: Algorithm 2 as printed, slow");
     v.basic()("antenna_offset", antenna_offset, "m",
               "x, y and z of the antenna in base_link_frame; zeros: from tf, by the fix's frame_id");
     v("antenna_sigma", antenna_sigma, non_negative(), "m per horizontal axis",
@@ -62,6 +73,7 @@ struct OcclusionPipelineParameters {
   VoxelMapParameters voxels;
   ScanAlignerParameters aligner;
   VoxelRayTracerParameters voxel_tracer;
+  KdTreeRayTracerParameters kdtree_tracer;
   GnssCovarianceParameters covariance;
   MapConsistencyParameters consistency;
 
@@ -71,11 +83,17 @@ struct OcclusionPipelineParameters {
     v.group("local_map", local_map, "Map of the surroundings, built from the lidar's clouds.");
     v.group("voxels", voxels, "Voxels of the map.");
     v.group("aligner", aligner, "Alignment of a cloud with the map (ICP).");
-    v.group("voxel_tracer", voxel_tracer, "Obstruction of a ray through the voxels.");
+    v.group("voxel_tracer", voxel_tracer, "Obstruction of a ray through the voxels (tracer voxel).");
+    v.group("kdtree_tracer", kdtree_tracer, "Algorithm 2 of Maier and Kleiner (tracer kdtree).");
     v.group("covariance", covariance, "Covariance of a fix, from the visible satellites.");
     v.group("consistency", consistency, "Agreement of map and satellites.");
   }
 };
+
+/// What section IV leaves of the parameters: Algorithm 2 with one ray to each satellite, eq. (6) and Algorithm 3,
+/// whether the receiver claims more or less. What the paper chose a number for (sigma_ure, the filter) or leaves open
+/// (kdtree_tracer, the map) stays a parameter, whose default is the paper's number.
+OcclusionPipelineParameters as_printed(OcclusionPipelineParameters parameters);
 
 /// How the odometry frame lies in the world, from a localizer or a compass.
 struct WorldAlignment {
@@ -142,6 +160,7 @@ class OcclusionPipeline {
   void clear_map();
 
   const LocalMap& local_map() const { return local_map_; }
+  /// As the mode leaves them.
   const OcclusionPipelineParameters& parameters() const { return parameters_; }
   const RayTracer& tracer() const;
   /// Blocked elevations around the antenna (skyline()), for each of sky_azimuths steps.

@@ -15,8 +15,11 @@ namespace urban_gnss {
 namespace {
 
 constexpr int kNoise = 3;  ///< speed, second input, yaw rate: MotionNoise
-constexpr int kAugmented = Ukf::kDimension + kNoise;
 constexpr int kYaw = 2;
+
+/// A column for each of at most `Most` axes, in both directions.
+template <int Rows, int Most>
+using BothWays = Eigen::Matrix<double, Rows, Eigen::Dynamic, 0, Rows, 2 * Most>;
 
 constexpr double kUnknownYawVariance = kPi * kPi / 3.0;
 
@@ -33,43 +36,67 @@ void limit_yaw_variance(Ukf::Covariance& covariance) {
   covariance.col(kYaw) *= factor;
 }
 
+template <int N>
+bool make_positive_definite(Eigen::Matrix<double, N, N>& covariance) {
+  if (!is_positive_definite(covariance)) covariance = nearest_positive_definite(covariance);
+  return is_positive_definite(covariance);
+}
+
+/// Fixes are what they declare, with independent errors.
+UkfParameters with_declared_noise(UkfParameters p) {
+  p.fix_noise.fix_scale_rate = 0.0;
+  p.fix_noise.fix_covariance_weight = 1.0;
+  p.fix_noise.fix_scale_lag = 0.0;
+  p.fix_noise.errors = {0.0, 0.0};
+  p.reacquisition.reacquisition_sigma = 0.0;
+  p.common_error = {0.0, 0.0, 0.0};
+  return p;
+}
+
 }  // namespace
+
+EnumNames<UkfMode> enum_names(UkfMode) {
+  return {{"standard", UkfMode::kStandard}, {"as_printed", UkfMode::kAsPrinted}};
+}
 
 EnumNames<OutlierPolicy> enum_names(OutlierPolicy) {
   return {{"student_t", OutlierPolicy::kStudentT}, {"gate", OutlierPolicy::kGate}, {"none", OutlierPolicy::kNone}};
 }
 
 UkfParameters published_ukf() {
-  UkfParameters p;
-  p.fix_noise.fix_scale_rate = 0.0;
-  p.fix_noise.fix_covariance_weight = 1.0;
-  p.fix_noise.fix_scale_lag = 0.0;
+  UkfParameters p = with_declared_noise({});
   p.fix_noise.errors = {0.0, 1.0};
-  p.reacquisition.reacquisition_sigma = 0.0;
-  p.common_error = {0.0, 0.0, 0.0};
   p.odometry = {0.1, 0.03, 2e-4, 0.005, 3e-5, 0.0, 0.0, 0.03};
   return p;
 }
 
+UkfParameters as_printed(UkfParameters parameters) {
+  parameters = with_declared_noise(parameters);
+  parameters.mode = UkfMode::kAsPrinted;
+  parameters.outliers = OutlierPolicy::kNone;
+  parameters.odometry = {1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
+  return parameters;
+}
+
 Ukf::Ukf(const UkfParameters& parameters, const MotionParameters& motion)
-    : parameters_(parameters),
+    : parameters_(parameters.mode == UkfMode::kAsPrinted ? as_printed(parameters) : parameters),
       motion_(motion),
       motion_weights_(
-          UnscentedWeights::of(kAugmented, parameters.ukf_alpha, parameters.ukf_beta, parameters.ukf_kappa)),
-      fix_weights_(UnscentedWeights::of(kDimension, parameters.ukf_alpha, parameters.ukf_beta, parameters.ukf_kappa)),
+          UnscentedWeights::of(states() + kNoise, parameters.ukf_alpha, parameters.ukf_beta, parameters.ukf_kappa)),
+      fix_weights_(UnscentedWeights::of(states(), parameters.ukf_alpha, parameters.ukf_beta, parameters.ukf_kappa)),
       nis_threshold_(parameters.gate_probability < 1.0 ? chi_squared_quantile(parameters.gate_probability, kFixDof)
                                                        : std::numeric_limits<double>::infinity()),
-      noise_(parameters.fix_noise),
-      reacquisition_(parameters.reacquisition) {
+      noise_(parameters_.fix_noise),
+      reacquisition_(parameters_.reacquisition) {
   initialize({});
 }
 
 void Ukf::initialize(const PoseEstimate& start) {
   if (!is_finite(start.pose)) throw std::invalid_argument("ukf: the pose to start from is not finite");
   if (!start.covariance.allFinite()) throw std::invalid_argument("ukf: the covariance to start from is not finite");
-  const Covariance covariance = initial_error_covariance(start.covariance, parameters_.odometry);
+  covariance_ = initial_error_covariance(start.covariance, parameters_.odometry);
   state_ << start.pose.x, start.pose.y, wrap_angle(start.pose.yaw), 0.0, 0.0;
-  covariance_ = is_positive_definite(covariance) ? covariance : nearest_positive_definite(covariance);
+  repair(covariance_);
   limit_yaw_variance(covariance_);
   noise_.reset();
   track_ = {};
@@ -90,20 +117,20 @@ void Ukf::move(const Twist2& twist, double duration_s) {
   const MotionStep step = make_motion_step(twist, duration_s, motion_, parameters_.odometry);
   const Pose2 centre = moved(state_, step, {});
   const double centre_turn = angle_difference(centre.yaw, state_[kYaw]);
-  const Covariance root = motion_weights_.spread * cholesky_root(covariance_);
+  const Covariance spread = motion_weights_.spread * root();
 
   // Differences of the moved points from the moved centre.
-  Eigen::Matrix<double, kDimension, 2 * kAugmented> differences;
-  for (int i = 0; i < 2 * kAugmented; ++i) {
+  BothWays<kDimension, kDimension + kNoise> differences(kDimension, 2 * (states() + kNoise));
+  for (int i = 0; i < differences.cols(); ++i) {
     const int axis = i / 2;
     const double sign = i % 2 == 0 ? 1.0 : -1.0;
     State offset = State::Zero();
     MotionNoise noise;
-    if (axis < kDimension) {
-      offset = sign * root.col(axis);
+    if (axis < states()) {
+      offset = sign * spread.col(axis);
     } else {
       const double draw = sign * motion_weights_.spread;
-      (axis == kDimension ? noise.speed : axis == kDimension + 1 ? noise.input : noise.yaw_rate) = draw;
+      (axis == states() ? noise.speed : axis == states() + 1 ? noise.input : noise.yaw_rate) = draw;
     }
     const State point = state_ + offset;
     const Pose2 pose = moved(point, step, noise);
@@ -141,20 +168,35 @@ bool Ukf::accept(State state, Covariance covariance) {
   state[kYaw] = wrap_angle(state[kYaw]);
   covariance = 0.5 * (covariance + covariance.transpose().eval());
   limit_yaw_variance(covariance);
-  if (!is_positive_definite(covariance)) covariance = nearest_positive_definite(covariance);
-  if (!is_positive_definite(covariance)) return false;
+  if (!repair(covariance)) return false;
   state_ = state;
   covariance_ = covariance;
   return true;
 }
 
+bool Ukf::repair(Covariance& covariance) const {
+  if (states() == kDimension) return make_positive_definite(covariance);
+  Eigen::Matrix3d of_pose = covariance.topLeftCorner<3, 3>();
+  const bool is_usable = make_positive_definite(of_pose);
+  covariance.setZero();
+  covariance.topLeftCorner<3, 3>() = of_pose;
+  return is_usable;
+}
+
+Ukf::Covariance Ukf::root() const {
+  if (states() == kDimension) return cholesky_root(covariance_);
+  Covariance root = Covariance::Zero();
+  root.topLeftCorner<3, 3>() = cholesky_root<3>(covariance_.topLeftCorner<3, 3>());
+  return root;
+}
+
 Ukf::Prediction Ukf::predict(const Eigen::Vector2d& antenna_in_body) const {
   const Eigen::Vector2d centre = transform_point(pose(), antenna_in_body);
-  const Covariance root = fix_weights_.spread * cholesky_root(covariance_);
-  Eigen::Matrix<double, 2, 2 * kDimension> differences;
-  Eigen::Matrix<double, kDimension, 2 * kDimension> offsets;
-  for (int i = 0; i < 2 * kDimension; ++i) {
-    offsets.col(i) = (i % 2 == 0 ? 1.0 : -1.0) * root.col(i / 2);
+  const Covariance spread = fix_weights_.spread * root();
+  BothWays<2, kDimension> differences(2, 2 * states());
+  BothWays<kDimension, kDimension> offsets(kDimension, 2 * states());
+  for (int i = 0; i < offsets.cols(); ++i) {
+    offsets.col(i) = (i % 2 == 0 ? 1.0 : -1.0) * spread.col(i / 2);
     const State point = state_ + offsets.col(i);
     differences.col(i) = transform_point({point[0], point[1], point[kYaw]}, antenna_in_body) - centre;
   }

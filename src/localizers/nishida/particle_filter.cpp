@@ -84,7 +84,6 @@ void ParticleFilter::move(const Twist2& twist, double duration_s) {
 }
 
 void ParticleFilter::doubt(const MotionDoubt& doubt) {
-  if (parameters_.is_as_printed()) return;  // the text knows no noise but that of (5) to (7)
   particles_.spread(doubt.position_m2, doubt.heading_rad2, engine_);
 }
 

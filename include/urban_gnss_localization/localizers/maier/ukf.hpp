@@ -13,6 +13,13 @@
 
 namespace urban_gnss {
 
+/// How closely section III-A of Maier and Kleiner is followed.
+enum class UkfMode {
+  kStandard,   ///< ours: with the odometry's errors as states, and what is learnt of the fixes
+  kAsPrinted,  ///< the pose alone, every fix with the covariance that it declares
+};
+EnumNames<UkfMode> enum_names(UkfMode);
+
 /// What is done with a fix whose normalised innovation is larger than it should be.
 enum class OutlierPolicy {
   kStudentT,  ///< weighed down, the more the farther it is off
@@ -22,6 +29,7 @@ enum class OutlierPolicy {
 EnumNames<OutlierPolicy> enum_names(OutlierPolicy);
 
 struct UkfParameters {
+  UkfMode mode{UkfMode::kStandard};
   OutlierPolicy outliers{OutlierPolicy::kStudentT};
   double student_dof{1.0};
   double gate_probability{0.99};
@@ -35,18 +43,22 @@ struct UkfParameters {
   double ukf_kappa{0.0};
 
   void visit(ParameterVisitor& v) {
+    v.basic()("mode", mode,
+              "standard: ours; as_printed: the pose alone, and fixes as they declare, as Maier and Kleiner print it");
     v.basic()("outliers", outliers,
-              "treatment of outlying fixes; student_t: weighted down; gate: rejected; none: used as they are");
+              "treatment of outlying fixes; student_t: weighted down; gate: rejected; none: used as they are, also as "
+              "printed");
     v("student_dof", student_dof, positive(), "",
       "degrees of freedom of Student's t-distribution (student_t); small: robust; large: Gaussian");
     v("gate_probability", gate_probability, open_between(0.0, 1.0), "",
       "probability that a good fix is not classified as an outlier; 1: no fix is");
     v("gate_timeout", gate_timeout, positive(), "s",
       "time with nothing but rejected fixes after which the filter restarts on the fix (gate)");
-    v.group("fix_noise", fix_noise, "Noise of the fixes relative to their declared covariance.");
-    v.group("reacquisition", reacquisition, "The first fixes after a gap.");
-    v.group("common_error", common_error, "Error that fixes share for a whole drive, which no filter can see.");
-    v.group("odometry", odometry, "Errors of the odometry, which the filter estimates.");
+    v.group("fix_noise", fix_noise, "Noise of the fixes relative to their declared covariance; not as printed.");
+    v.group("reacquisition", reacquisition, "The first fixes after a gap; not as printed.");
+    v.group("common_error", common_error,
+            "Error that fixes share for a whole drive, which no filter can see; not as printed.");
+    v.group("odometry", odometry, "Errors of the odometry, which the filter estimates; not as printed.");
     v("ukf_alpha", ukf_alpha, between(1e-3, 1.0), "", "spread alpha of the sigma points");
     v("ukf_beta", ukf_beta, non_negative(), "",
       "weight beta of the central sigma point in the covariance; 2: for Gaussian errors");
@@ -54,12 +66,18 @@ struct UkfParameters {
   }
 };
 
-/// As the paper has it: fixes are what they declare, with independent errors but for a second; all noise of the
-/// odometry is in the motion model.
+/// For the paper's own experiment, in the standard mode: fixes are what they declare, with independent errors but for a
+/// second, and an odometry that does not wander.
 UkfParameters published_ukf();
+
+/// `parameters` without what is ours: neither robust weights nor a gate, fixes are what they declare, with independent
+/// errors and none that they share, and all noise of the odometry is the motion model's, as it stands.
+UkfParameters as_printed(UkfParameters parameters);
 
 /// The unscented Kalman filter of Maier and Kleiner 2010, section III-A: x_t = g(x_{t-1}, u_{t-1}) + noise, eq. (1),
 /// z_t = h(x_t) + noise, eq. (2), with the scaled unscented transform.
+///
+/// As printed the state is the pose, and that is all. What follows is the standard mode.
 ///
 /// The state is (x, y, yaw, s, b): the pose, the relative error s of the odometry's speed and the error b of its yaw
 /// rate, so that the robot's speed is (1 + s) v and its yaw rate w + b for the odometry's v and w. Odometry, or a
@@ -87,7 +105,11 @@ class Ukf : public Localizer {
   Ukf(const UkfParameters& parameters, const MotionParameters& motion);
 
   const char* name() const override { return "ukf"; }
-  std::string mode() const override { return enum_name(parameters_.outliers); }
+  /// "as_printed", or what is done with outliers.
+  std::string mode() const override {
+    return is_as_printed() ? enum_name(parameters_.mode) : enum_name(parameters_.outliers);
+  }
+  bool is_as_printed() const override { return parameters_.mode == UkfMode::kAsPrinted; }
   bool wants_bias() const override { return false; }
   /// Throws std::invalid_argument where pose or covariance is not finite. A covariance that is not positive definite is
   /// replaced by one close to it.
@@ -103,11 +125,18 @@ class Ukf : public Localizer {
 
   double speed_scale() const { return state_[3]; }
   double yaw_rate_bias_radps() const { return state_[4]; }
-  /// x, y, yaw, speed scale, yaw-rate bias; m, m, rad, 1, rad/s.
+  /// x, y, yaw, speed scale, yaw-rate bias; m, m, rad, 1, rad/s. As printed the last two are 0, and so is their
+  /// covariance.
   const State& state() const { return state_; }
   const Covariance& covariance() const { return covariance_; }
 
  private:
+  /// How many of the states there are: the pose alone, or all.
+  int states() const { return parameters_.mode == UkfMode::kAsPrinted ? 3 : kDimension; }
+  /// A lower root of the covariance of these states; 0 elsewhere.
+  Covariance root() const;
+  /// Makes the covariance of these states positive definite, and that of others 0. Whether it succeeded.
+  bool repair(Covariance& covariance) const;
   /// The fix predicted from the state.
   struct Prediction {
     Eigen::Vector2d position;

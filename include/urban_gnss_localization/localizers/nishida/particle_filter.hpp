@@ -83,6 +83,8 @@ class ParticleFilter : public ParticleLocalizer {
 
   const char* name() const override { return "particle_filter"; }
   std::string mode() const override { return enum_name(parameters_.mode); }
+  bool is_as_printed() const override { return parameters_.is_as_printed(); }
+  ParticleFilterMode filter_mode() const { return parameters_.mode; }
   bool wants_bias() const override { return parameters_.mode != ParticleFilterMode::kConventional; }
   void initialize(const PoseEstimate& start) override;
   void move(const Twist2& twist, double duration_s) override;
