@@ -255,7 +255,7 @@ TEST(IntegrityMonitor, AnEstimateThatGivesWayIsDoubtedForAWhile) {
   EXPECT_NEAR(sigma_m, way_m, 1.5);
   EXPECT_NEAR(fixes.monitor.covariance().determinant(), 0.0, 1e-6);  // along the way alone
   fixes.add(60, kNone);
-  EXPECT_NEAR(std::sqrt(fixes.monitor.covariance().trace()), sigma_m * std::exp(-0.5), 0.5);
+  EXPECT_NEAR(std::sqrt(fixes.monitor.covariance().trace()), sigma_m * std::exp(-0.3), 0.5);
   EXPECT_FALSE(fixes.monitor.contradiction());
 }
 

@@ -15,7 +15,7 @@ namespace urban_gnss {
 /// Parameters of the ranges of a fix.
 struct RangeFixParameters {
   bool use_ranges{true};
-  double range_sigma{5.0};
+  double range_sigma{4.0};
   double range_sigma_min{0.6};
   double range_sigma_max{8.0};
   NlosParameters nlos;

@@ -14,7 +14,7 @@ inline constexpr std::size_t kQualityLevels = 3;
 
 struct OdometryQualityParameters {
   double wander_factor{12.0};
-  double wander_share{0.4};
+  double wander_share{0.3};
   double quality_time{600.0};
   double quality_evidence{0.1};
 

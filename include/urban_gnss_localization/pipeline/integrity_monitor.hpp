@@ -16,7 +16,7 @@ struct IntegrityParameters {
   double integrity_window{30.0};
   double integrity_limit{3.0};
   double contradiction_patience{20.0};
-  double doubt_time{60.0};
+  double doubt_time{100.0};
   double residual_limit{5.0};
 
   void visit(ParameterVisitor& v) {

@@ -20,6 +20,10 @@
 
 namespace urban_gnss {
 
+/// The common error where the odometry's quality is learnt. Smaller than the default, with which filters that do not
+/// learn it cover a part of the odometry's drift, too.
+inline constexpr CommonErrorParameters kCommonErrorBesideLearntOdometry{0.55, 0.15, 4.0};
+
 /// The model of odometry and receiver that the filters of the switching bias share.
 struct SwitchingModelParameters {
   FixSigmaParameters fix;
@@ -31,8 +35,8 @@ struct SwitchingModelParameters {
   OdometryQualityParameters quality;
   double yaw_rate_scale_sigma{0.005};
   ReacquisitionParameters reacquisition;
-  CommonErrorParameters common_error;
-  double range_common_error_share{0.4};
+  CommonErrorParameters common_error{kCommonErrorBesideLearntOdometry};
+  double range_common_error_share{0.35};
 
   void visit(ParameterVisitor& v) {
     v.include(fix);

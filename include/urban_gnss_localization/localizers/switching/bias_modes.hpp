@@ -36,7 +36,7 @@ struct BiasModeParameters {
   double jump_sigma{20.0};
   double bias_fade_time{20.0};
   double onset_sigma{0.5};
-  double student_dof{2.5};
+  double student_dof{1.4};
   double outlier_share{0.01};
   double outlier_radius{200.0};
 
