@@ -13,6 +13,7 @@ namespace {
 constexpr std::size_t kEpochs = 60;
 constexpr std::size_t kLeastEpochs = 20;
 constexpr Eigen::Index kLeastSpare = 2;
+constexpr double kBelievedAgain = 2.0 / 3.0;
 constexpr double kLeastSine = 0.05;  ///< of an elevation, for the weights
 constexpr double kCn0Unknown_dbhz = 35.0;
 constexpr double kCn0Min_dbhz = 15.0;
@@ -69,11 +70,9 @@ void ResidualCheck::add(const std::vector<SatelliteObservation>& satellites) {
   if (!misfit) return;
   misfits_.push_back(*misfit);
   if (misfits_.size() > kEpochs) misfits_.pop_front();
-}
-
-bool ResidualCheck::belong() const {
-  if (misfits_.size() < kLeastEpochs) return true;
-  return upper_median(std::vector<double>(misfits_.begin(), misfits_.end())) <= parameters_.residual_misfit_limit;
+  if (misfits_.size() < kLeastEpochs) return;
+  const double usual = upper_median(std::vector<double>(misfits_.begin(), misfits_.end()));
+  belong_ = usual <= parameters_.residual_misfit_limit * (belong_ ? 1.0 : kBelievedAgain);
 }
 
 }  // namespace urban_gnss

@@ -91,5 +91,25 @@ TEST(ResidualCheck, GoesByTheMedianOfTheLastEpochs) {
   EXPECT_FALSE(add(2, 60.0));
 }
 
+TEST(ResidualCheck, DoesNotSwitchToAndFroAtTheLimit) {
+  RandomEngine engine = make_engine(306);
+  const Sky at_fix = solved(noisy(engine), by_cn0);
+  const Sky near = seen_from_beside(at_fix, 15.0);
+  const Sky far = seen_from_beside(at_fix, 100.0);
+  ResidualCheckParameters parameters;
+  parameters.residual_misfit_limit = residual_misfit(near).value() / 0.8;
+  ASSERT_LT(parameters.residual_misfit_limit, residual_misfit(far).value());
+  ResidualCheck check{parameters};
+  const auto belong_after = [&](const Sky& sky) {
+    for (int k = 0; k < 60; ++k) check.add(sky);
+    return check.belong();
+  };
+  EXPECT_TRUE(belong_after(near));
+  EXPECT_FALSE(belong_after(far));
+  EXPECT_FALSE(belong_after(near)) << "below the limit, but not far enough to be believed again";
+  EXPECT_TRUE(belong_after(at_fix));
+  EXPECT_TRUE(belong_after(near));
+}
+
 }  // namespace
 }  // namespace urban_gnss

@@ -10,7 +10,7 @@
 namespace urban_gnss {
 
 struct ResidualCheckParameters {
-  double residual_misfit_limit{1.0};
+  double residual_misfit_limit{1.5};
 
   void visit(ParameterVisitor& v) {
     v("residual_misfit_limit", residual_misfit_limit, positive(), "",
@@ -30,8 +30,9 @@ std::optional<double> residual_misfit(const std::vector<SatelliteObservation>& s
 
 /// Whether a receiver's residuals are those of its fixes, by the median of its last 60 epochs, once there are 20.
 /// Residuals of another place would move a fix by the difference. Those of a filtered fix are no solution's either, but
-/// tell the ranges all the same if they are taken at the fix: simulated ones have 0.1 to 0.9, so the limit is above.
-/// Residuals of another epoch, or of a place a few metres beside, are not found.
+/// tell the ranges all the same if they are taken at the fix: simulated ones have 0.1 to 1.2, so the limit is above.
+/// They are believed again below 2/3 of the limit. Residuals of another epoch, or of a place a few metres beside, are
+/// not found.
 class ResidualCheck {
  public:
   /// Requires parameters without faults.
@@ -40,12 +41,13 @@ class ResidualCheck {
   /// Adds an epoch; one without enough residuals changes nothing.
   void add(const std::vector<SatelliteObservation>& satellites);
   /// True as long as nothing speaks against it.
-  bool belong() const;
+  bool belong() const { return belong_; }
   void reset() { *this = ResidualCheck(parameters_); }
 
  private:
   ResidualCheckParameters parameters_;
   std::deque<double> misfits_;  ///< of the last epochs
+  bool belong_{true};
 };
 
 }  // namespace urban_gnss
