@@ -118,7 +118,7 @@ def patterns(evidence, fix, known, sigma, scatter):
         findings.append(warned("covariance.hdop", "{}: sigma is {} (vertical twice that): {}".format(
             topic, "0.1 m times HDOP" if low else "the HDOP itself",
             "nmea_navsat_driver takes it so for SBAS" if low else "HDOP^2 as a variance, without the receiver's error "
-            "(UERE)"), change, "or GST sentences switched on in the receiver"))
+            "(UERE)"), "nothing: fix_sigma_default times HDOP is used; better with GST sentences of the receiver"))
     # A driver that writes millimetres of sigma into the variance: its values are round, their roots are not.
     if distinct > 10 and is_multiple(cov_xx, 0.001) and not is_multiple(np.sqrt(cov_xx), 0.001) \
             and signals.median(cov_xx) > 0.05 and not np.any(np.abs(fix.cov_xy) > 0.0):

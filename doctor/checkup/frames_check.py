@@ -106,9 +106,10 @@ def sensor_tf(recording, setup):
         else:
             what = ("the antenna is taken to be at {}".format(base) if stream.kind == "fix" else
                     "it is taken to have its z axis up")
-            change = ["tf2_ros static_transform_publisher X Y Z 0 0 0 {} {}".format(base, frame)]
+            change = ["in a launch file: <node pkg=\"tf2_ros\" type=\"static_transform_publisher\" name=\"{}_tf\" "
+                      "args=\"X Y Z 0 0 0 {} {}\"/>".format(stream.kind, base, frame)]
             if stream.kind == "fix":
-                change.append("{}: {{antenna_offset: [X, Y]}}  # m, or this".format(setup.section))
+                change.insert(0, "{}: {{antenna_offset: [X, Y]}}  # m; or a tf:".format(setup.section))
             findings.append(warned("frames.tf_" + stream.kind, "no tf from {} to {}, the frame of {}: {}".format(
                 base, frame, stream.topic, what), *change))
     return findings

@@ -62,7 +62,7 @@ def paired(evidence, satellites):
     if known and known[0].type != "urban_gnss_localization/SatelliteArray":
         if len(satellites) < RARE_SHARE * len(fix):
             return [warned("satellites.rate", "{}: {} messages for {} fixes".format(topic, len(satellites), len(fix)),
-                           "u-blox: publish/nav/sat: true, and CFG-MSG of NAV-SAT with rate 1")]
+                           "u-blox: docs/receivers/ublox.md says how NAV-SAT comes with every solution")]
         return []  # a preset pairs them
     stamps = np.sort(satellites.t)
     place = np.clip(np.searchsorted(stamps, fix.t), 1, max(len(stamps) - 1, 1))

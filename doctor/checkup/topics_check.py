@@ -22,6 +22,8 @@ PRESETS = (
     ("nmea", r"^nmea_msgs/"),
     ("gpsd", r"^gps_common/GPS(Fix|Status)$|^gps_msgs/GPS"),
 )
+# Where receiver_node looks for the driver's topics (receivers/receiver_presets.cpp); the others' have none.
+PRESET_NAMESPACES = {"ublox": "ublox_gps", "septentrio": "septentrio_gnss", "mavros": "mavros"}
 BETTER_WITH = {
     "velocity": "the heading would be known within seconds of driving, and dead wheels would be noticed",
     "imu": "turns would be known better than by wheels",
@@ -39,9 +41,11 @@ def check(evidence):
 
 
 def remedy(recording, kind):
-    """The launch argument for a topic that does not have its usual name."""
+    """The launch argument for a topic that does not have its usual name; none for a driver's own messages."""
     topic = recording.choices.get(kind, ("", ""))[0]
     if not topic or same_name(topic, DEFAULT_NAMES[kind]):
+        return ()
+    if any(same_name(each.name, topic) and each.type.split("/")[-1] not in TYPES[kind] for each in recording.topics):
         return ()
     return ("localization.launch {}:={}".format(LAUNCH_ARGUMENTS[kind], topic),)
 
@@ -77,18 +81,18 @@ def missing(recording, kind, topic):
     name = "topics." + kind
     what = "no messages on {}".format(topic) if topic else "no topic of the type {}".format(TYPES[kind])
     if kind in NEEDED:
-        preset = preset_of(recording) if kind == "fix" else None
+        preset = receiver_argument(recording) if kind == "fix" else None
         # A bag may hold only a part of what the robot has; a live graph without it does not work.
         finding = failed if recording.is_live or not recording.streams() else warned
         text = ("no fixes: {}; without them nothing is localized" if kind == "fix" else
                 "no odometry: {}; a localizer needs it, or replay --odom none").format(what)
         return finding(name, text,
-                       "localization.launch receiver:={}".format(preset) if preset else available(recording))
+                       "localization.launch " + preset if preset else available(recording))
     if kind == "imu" or preset_of(recording) is None:
         return warned(name, "{}: {}; with it {}".format(NAMES[kind], what, BETTER_WITH[kind]),
                       "localization.launch {}:=TOPIC, if the robot has one".format(LAUNCH_ARGUMENTS[kind]))
     return warned(name, "no {} as such, but the receiver's own messages are there".format(NAMES[kind]),
-                  "localization.launch receiver:={}".format(preset_of(recording)))
+                  "localization.launch " + receiver_argument(recording))
 
 
 def available(recording):
@@ -111,17 +115,36 @@ def preset_of(recording):
     return None
 
 
+def is_of_driver(type_name):
+    """Whether it is a type of message of a receiver's driver."""
+    return any(re.search(pattern, type_name) for _, pattern in PRESETS)
+
+
+def receiver_argument(recording):
+    """The launch arguments for the preset, with the namespace of the driver's topics; None where there is no driver."""
+    preset = preset_of(recording)
+    if preset is None:
+        return None
+    names = [each.name.strip("/") for each in recording.topics if each.count > 0 and is_of_driver(each.type)]
+    if preset == "mavros":
+        names = [each.name.strip("/").replace("/global_position/raw", "") for each in recording.topics
+                 if "/global_position/raw/" in each.name]
+    namespace = names[0].rpartition("/")[0] if names else ""
+    if namespace == PRESET_NAMESPACES.get(preset, ""):
+        return "receiver:={}".format(preset)
+    return "receiver:={} receiver_ns:={}".format(preset, namespace or "/")
+
+
 def preset_findings(recording):
     """Which preset fits, and a fix that is no receiver's."""
     findings = []
     preset = preset_of(recording)
     if preset:
-        types = sorted({each.type for each in recording.topics
-                        if re.search("|".join(pattern for _, pattern in PRESETS), each.type)}) or ["mavros's topics"]
+        types = sorted({each.type for each in recording.topics if is_of_driver(each.type)}) or ["mavros's topics"]
         findings.append(warned("topics.receiver", "messages of a receiver's driver are there ({}{}): its preset takes "
                                "fixes, velocity and satellites of them".format(", ".join(types[:3]),
                                                                                " ..." if len(types) > 3 else ""),
-                               "localization.launch receiver:={}".format(preset), preset=preset))
+                               "localization.launch " + receiver_argument(recording), preset=preset))
     fix_topic = recording.choices.get("fix", ("", ""))[0]
     if re.search(r"global_position/global$|gps/filtered$", fix_topic):
         findings.append(failed("topics.fused", "{} is an estimate that is already fused, not the receiver's fix".format(

@@ -89,10 +89,9 @@ def speed(evidence):
                         "in the driver: twist.linear.x in m/s; the base's wheel_radius * {:.3f}".format(1.0 / factor),
                         **values)]
     if sure and abs(factor - 1.0) > SCALE_WARN and spread < 0.5:
-        return [warned("odometry.speed", text + ": the wheels' circumference",
+        return [warned("odometry.speed", text + ": the wheels' circumference; it is learnt",
                        "the base's parameter wheel_radius (or its multiplier) * {:.3f}".format(1.0 / factor),
-                       "{}: {{speed_scale_sigma: {:.2f}}}  # or this: it is learnt".format(
-                           evidence.setup.section, np.ceil(100.0 * abs(factor - 1.0)) / 100.0), **values)]
+                       **values)]
     return [passed("odometry.speed", text, **values)]
 
 
@@ -147,8 +146,8 @@ def dead(evidence):
     moving = float(np.sum(speed_of > least)) * signals.period(t)
     topic = evidence.recording.odometry.topic
     if total > max(WARN_S, WARN_SHARE * moving):
-        text = "{}: the wheels stand for {:.0f} s while the receiver moves (from {:.0f} s on): a dead encoder or " \
-            "slipping wheels".format(topic, total, standing[0][0] - evidence.recording.begin)
+        text = "{}: the wheels stand for {:.0f} s while the receiver moves (from {:.0f} s on): a dead encoder, " \
+            "slipping wheels, or reflections".format(topic, total, standing[0][0] - evidence.recording.begin)
         enough = max(FAIL_S, FAIL_SHARE * moving) * (1.0 if evidence.velocities is not None else 2.0)
         finding = failed if total > enough else warned
         return [finding("odometry.wheels", text, "encoder and cable; {} takes the receiver's speed meanwhile, where it "

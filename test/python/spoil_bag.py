@@ -196,7 +196,7 @@ FAULTS = {
     "imu_on_its_side": ("imu", imu_on_its_side, "not vertical"),
     "imu_clock": ("imu", shift(1.0), "ahead of"),
     "imu_since_start": ("imu", since_start, "another time"),
-    "fix_late": ("fix", shift(1.5), "ahead of"),
+    "fix_ahead": ("fix", shift(1.5), "ahead of"),
     "fix_gps_time": ("fix", shift(18.0), "GPS time"),
     "fix_stamp_zero": ("fix", stamp_zero, "stamps are zero"),
     "fix_frame_empty": ("fix", frame_empty, "frame_id is empty"),

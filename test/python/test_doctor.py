@@ -313,9 +313,11 @@ class ModuleTest(unittest.TestCase):
 
     def test_presets(self):
         for type_name, topic, preset in (
-                ("ublox_msgs/NavSAT", "/gps/navsat", "ublox"), ("nmea_msgs/Sentence", "/nmea_sentence", "nmea"),
+                ("ublox_msgs/NavSAT", "/ublox_gps/navsat", "ublox"),
+                ("ublox_msgs/NavSAT", "/earth_gps/navsat", "ublox receiver_ns:=earth_gps"),
+                ("ublox_msgs/NavSAT", "/navsat", "ublox receiver_ns:=/"), ("nmea_msgs/Sentence", "/nmea_sentence", "nmea"),
                 ("gps_common/GPSFix", "/extended_fix", "gpsd"),
-                ("gps_common/GPSFix", "/septentrio/gpsfix", "septentrio"),
+                ("gps_common/GPSFix", "/septentrio_gnss/gpsfix", "septentrio"),
                 ("novatel_gps_msgs/Trackstat", "/trackstat", "novatel"),
                 ("sensor_msgs/NavSatFix", "/mavros/global_position/raw/fix", "mavros")):
             recording = drive(seconds=20.0)
