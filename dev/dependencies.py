@@ -2,8 +2,8 @@
 """Whether each package that the repository uses is declared.
 
 Looks through the whole tree for what others ship: #include, Python imports, nodes and $(find ...) of launch files,
-message types, and programs that shell scripts and Python's subprocess call. Each is to belong to a package in
-scripts/apt-debian.txt. That file is a table: Debian's package, its counterpart on Ubuntu with Noetic, and the key in
+message types, what CMake finds, and programs that shell scripts and Python's subprocess call. Each is to belong to a
+package in scripts/apt-debian.txt, and what is used by more than tests to one that package.xml has not for tests only. That file is a table: Debian's package, its counterpart on Ubuntu with Noetic, and the key in
 package.xml, with which it is compared too. On a system that is no Debian, only the table is checked.
 
 Needs no declaration: the standard libraries of C, C++ and Python, the packages that every Debian has (dpkg's
@@ -28,7 +28,7 @@ TABLE = os.path.join("scripts", "apt-debian.txt")
 LEFT_OUT = {".git", ".workspace", "results", "__pycache__"}
 PYTHON = "/usr/bin/python3"  # Debian's, whichever runs this
 
-# Of kind include, import, node (PACKAGE/TYPE), package, message (PACKAGE/TYPE) or program. One that is not `certain`,
+# Of kind include, import, node (PACKAGE/TYPE), package, message (PACKAGE/TYPE), cmake or program. One that is not `certain`,
 # for it may be an argument, counts where something of its name is installed.
 Use = namedtuple("Use", "kind name file line certain")
 Row = namedtuple("Row", "debian noetic key line")
@@ -55,12 +55,17 @@ def read_table(path):
     return rows, problems
 
 
-def compare_with_package_xml(rows, path):
-    """What only one of the table and package.xml has."""
+def read_package_xml(path):
+    """The tags by which package.xml declares each key."""
     keys = {}
     for element in xml.etree.ElementTree.parse(path).getroot():
         if element.tag == "depend" or element.tag.endswith("_depend"):
-            keys.setdefault(element.text.strip(), element.tag)
+            keys.setdefault(element.text.strip(), set()).add(element.tag)
+    return keys
+
+
+def compare_with_package_xml(rows, keys):
+    """What only one of the table and package.xml has."""
     problems = ["%s:%d: package.xml lacks %s, the key of %s" % (TABLE, row.line, row.key, row.debian)
                 for row in rows if row.key != "-" and row.key not in keys]
     known = {row.key for row in rows}
@@ -116,11 +121,34 @@ def imports_and_programs(text, file, first_line=1):
         elif isinstance(node, ast.ImportFrom) and node.level == 0:
             for alias in node.names:
                 yield Use("import", node.module + "." + alias.name, file, line, True)
+        elif isinstance(node, ast.Call) and imported_by_name(node):
+            yield Use("import", imported_by_name(node), file, line, True)
         elif isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.args:
             called = "%s.%s" % (getattr(node.func.value, "id", ""), node.func.attr)
             if re.fullmatch(r"subprocess\.\w+|os\.(system|popen|exec\w+|spawn\w+)|shutil\.which", called):
                 for command in words(node.args[0]):
                     yield from called_program(command, file, line)
+
+
+def imported_by_name(call):
+    """The module of importlib.import_module("x") or __import__("x"); None for other calls."""
+    name = getattr(call.func, "attr", getattr(call.func, "id", None))
+    is_import = name in ("import_module", "__import__") and call.args and isinstance(call.args[0], ast.Constant)
+    return call.args[0].value if is_import and isinstance(call.args[0].value, str) else None
+
+
+def cmake_packages(text, file):
+    """CMake: what find_package wants, catkin's components, and the packages of messages that ours are made of."""
+    text = re.sub(r"#[^\n]*", "", text)
+    lists = {match.group(1): match.group(2).split() for match in re.finditer(r"\bset\((\w+)\s+([^()\"]*)\)", text)}
+    for match in re.finditer(r"\b(find_package|generate_messages)\s*\(([^()]*)\)", text):
+        words = [part for word in match.group(2).split()
+                 for part in (lists.get(word[2:-1], []) if word.startswith("${") else [word])]
+        names = words[1:] if match.group(1) == "generate_messages" else words[:1]
+        if words[:1] == ["catkin"] and "COMPONENTS" in words:
+            names += words[words.index("COMPONENTS") + 1:]
+        for name in names:
+            yield Use("cmake", name, file, text.count("\n", 0, match.start()) + 1, True)
 
 
 def called_program(words, file, line):
@@ -229,6 +257,8 @@ def read_files(root):
 def language(path, text):
     """The language of a file, by its name or its first line; None for one that uses nothing."""
     extension = os.path.splitext(path)[1]
+    if os.path.basename(path) == "CMakeLists.txt" or extension == ".cmake":
+        return "cmake"
     first = text.split("\n", 1)[0]
     if extension in (".cpp", ".cc", ".c", ".hpp", ".hh", ".h"):
         return "c++"
@@ -263,6 +293,8 @@ def uses_of(files):
             found = launched(text, path)
         elif kind == "message":
             found = message_types(text, path)
+        elif kind == "cmake":
+            found = cmake_packages(text, path)
         else:
             continue
         uses += [use for use in found if use.kind == "program" or use.name.split("/")[0] != package]
@@ -274,9 +306,9 @@ def uses_of(files):
 class Debian:
     """Which installed package ships a file."""
 
-    # The compiler's and the interpreter's own.
+    # The compiler's, the interpreter's and CMake's own.
     STANDARD = re.compile(r"libc6-dev|linux-libc-dev|libstdc\+\+-\d+-dev|libgcc-\d+-dev|"
-                          r"(lib)?python3(\.\d+)?-(stdlib|minimal)")
+                          r"(lib)?python3(\.\d+)?-(stdlib|minimal)|cmake-data")
     ONLY_TEXTS = re.compile(r"/\.|/usr(/share)?|/usr/share/(doc|man|lintian|bug|build-essential)(/.*)?|")
 
     def __init__(self, uses):
@@ -350,6 +382,12 @@ class Debian:
                      for folder in ("/usr/lib", "/usr/share")]
         elif use.kind == "package":
             found = [os.path.join("/usr/share", use.name, "package.xml")]
+        elif use.kind == "cmake":
+            found = [path for name in (use.name, use.name.lower()) for folder in
+                     ("/usr/share/%s/cmake", "/usr/lib/*/cmake/%s*", "/usr/lib/cmake/%s*", "/usr/share/cmake/%s*",
+                      "/usr/share/cmake-*/Modules")
+                     for file in (use.name + "Config", name + "-config", "Find" + use.name)
+                     for path in glob.glob(os.path.join(folder.replace("%s", name), file + ".cmake"))]
         elif use.kind == "message":
             package, name = use.name.split("/")
             found = [os.path.join("/usr/share", package, "msg", name + ".msg")]
@@ -424,14 +462,35 @@ def undeclared(uses, files, listed, system):
             for text, where in places.items()]
 
 
+TESTS = ("test/", "benchmark/", "dev/", "CMakeLists.txt")  # where what is declared for tests only may be used
+
+
+def only_for_tests(uses, rows, keys, system):
+    """A line for each use outside of the tests of a package that package.xml declares for tests only."""
+    places = {}
+    for use in uses:
+        if use.file.startswith(TESTS):
+            continue
+        declared = {row.key: keys[row.key] for row in rows
+                    if row.key in keys and row.debian in system.packages.get(use, set())}
+        if declared and all(tags == {"test_depend"} for tags in declared.values()):
+            text = "%s %s is used here, but package.xml has %s for tests only (test_depend)" % (
+                use.kind, use.name, " and ".join(sorted(declared)))
+            places.setdefault(text, []).append("%s:%d" % (use.file, use.line))
+    return ["%s: %s" % (", ".join(where[:3]), text) for text, where in places.items()]
+
+
 def check(root, system_of=None):
     """What is wrong in the tree. `system_of` makes the system from the uses; without it only the table is checked."""
     files = read_files(root)
     rows, problems = read_table(os.path.join(root, TABLE))
-    problems += compare_with_package_xml(rows, os.path.join(root, "package.xml"))
+    keys = read_package_xml(os.path.join(root, "package.xml"))
+    problems += compare_with_package_xml(rows, keys)
     if system_of:
         uses = uses_of(files)
-        problems += undeclared(uses, files, [row.debian for row in rows], system_of(uses))
+        system = system_of(uses)
+        problems += undeclared(uses, files, [row.debian for row in rows], system)
+        problems += only_for_tests(uses, rows, keys, system)
     return problems
 
 

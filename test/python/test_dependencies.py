@@ -41,7 +41,7 @@ SHIPPED = {
     "good.h": "libgood-dev", "bad/bad.h": "libbad-dev", "vector": "libc6-dev",
     "fine_msgs.msg.Fine": "python3-fine-msgs", "bad_msgs.msg.Bad": "python3-bad-msgs", "bad_nodes/play": "bad-nodes",
     "bad_nodes": "bad-nodes",
-    "bad_msgs/Bad": "ros-bad-msgs", "badtool": "bad-tools", "g++": "g++", "rosrun": "bad-rosbash", "sed": "required",
+    "bad_msgs/Bad": "ros-bad-msgs", "bad_msgs": "libbad-msgs-dev", "Good": "libgood-dev", "catkin": "libgood-dev", "badtool": "bad-tools", "g++": "g++", "rosrun": "bad-rosbash", "sed": "required",
     "bash": "required", "timeout": "required", "python3": "required", "sys": "required", "subprocess": "required",
 }
 
@@ -67,11 +67,11 @@ class System:
 
 
 class TreeTest(unittest.TestCase):
-    def check(self, table=TABLE, package_xml=PACKAGE_XML, **files):
-        """What is wrong in a tree of these files; __ in a name stands for a point."""
+    def check(self, table=TABLE, package_xml=PACKAGE_XML, folder="room", **files):
+        """What is wrong in a tree of these files in one folder; __ in a name stands for a point."""
         with tempfile.TemporaryDirectory() as root:
             contents = {"package.xml": package_xml, TABLE_FILE: table}
-            contents.update((os.path.join("room", name.replace("__", ".")), text) for name, text in files.items())
+            contents.update((os.path.join(folder, name.replace("__", ".")), text) for name, text in files.items())
             for name, text in contents.items():
                 path = os.path.join(root, name)
                 os.makedirs(os.path.dirname(path), exist_ok=True)
@@ -88,7 +88,7 @@ class TreeTest(unittest.TestCase):
     def test_what_is_declared_passes(self):
         self.expect(self.check(
             a__cpp='#include <good.h>\n#include <vector>\n#include <our_robot/b.hpp>\n#include "c.hpp"\n', c__hpp="",
-            b__py="import sys\nimport c\nfrom fine_msgs.msg import Fine\nfrom our_robot.msg import Ours\n", c__py="",
+            b__py="import sys\nimport c\nfrom our_robot.msg import Ours\n", c__py="",
             d__launch="<launch><node pkg='our_robot' type='x' name='x' args='$(find our_robot)/y'/></launch>\n",
             e__sh="#!/bin/sh\nhelp() { g++ -v | sed s/a/b/; }\nhelp badtool_of_another_name 'badtool'  # badtool\n"))
 
@@ -104,6 +104,26 @@ class TreeTest(unittest.TestCase):
         self.expect(self.check(a__cfg="#!/usr/bin/env python3\nfrom bad_msgs.msg import Bad\n"), "room/a.cfg:2: " + bad)
         self.expect(self.check(a__sh="python3 - << 'END'\nimport sys\nfrom bad_msgs.msg import Bad\nEND\n"),
                     "room/a.sh:3: " + bad)
+
+    def test_import_by_name(self):
+        bad = "import bad_msgs.msg.Bad is shipped by python3-bad-msgs"
+        for call in ("importlib.import_module('bad_msgs.msg.Bad')", "__import__('bad_msgs.msg.Bad')"):
+            self.expect(self.check(a__py="import sys\nx = " + call + "\n"), "room/a.py:2: " + bad)
+        self.expect(self.check(a__py="import sys\nx = __import__(sys.argv[1])\n"))
+
+    def test_what_cmake_finds(self):
+        text = "set(more bad_msgs)  # a list\nfind_package(Good)\nfind_package(catkin REQUIRED COMPONENTS ${more})\n"
+        self.expect(self.check(CMakeLists__txt=text), "room/CMakeLists.txt:3: cmake bad_msgs is shipped by libbad-msgs-dev")
+        self.expect(self.check(CMakeLists__txt="generate_messages(DEPENDENCIES bad_msgs)\n"),
+                    "room/CMakeLists.txt:1: cmake bad_msgs")
+
+    def test_what_is_declared_for_tests_only(self):
+        use = "from fine_msgs.msg import Fine\n"
+        self.expect(self.check(folder="test", a__py=use))
+        self.expect(self.check(a__py=use), "room/a.py:1: import fine_msgs.msg.Fine is used here, but package.xml has "
+                                           "fine_msgs for tests only")
+        also = PACKAGE_XML.replace("<depend>good", "<exec_depend>fine_msgs</exec_depend>\n      <depend>good")
+        self.expect(self.check(a__py=use, package_xml=also))
 
     def test_undeclared_node(self):
         self.expect(self.check(a__launch="""
