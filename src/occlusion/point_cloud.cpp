@@ -5,9 +5,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <new>
 #include <stdexcept>
 
+#include "pcd_header.hpp"
 #include "pcl_cloud.hpp"
+#include "urban_gnss_localization/common/pending_file.hpp"
 #include "urban_gnss_localization/occlusion/key_index.hpp"
 #include "urban_gnss_localization/occlusion/voxel_walk.hpp"
 
@@ -82,22 +85,14 @@ double sample_spacing_m(const PointCloud& cloud) {
 }
 
 PointCloud read_pcd(const std::string& path) {
-  // PCL reads on where the header has made no sense, and crashes.
-  pcl::PCLPointCloud2 header;
-  const bool has_header = pcl::PCDReader().readHeader(path, header) == 0;
-  for (const char* name : {"x", "y", "z"}) {
-    const auto is_coordinate = [&](const pcl::PCLPointField& field) {
-      return field.name == name && field.datatype == pcl::PCLPointField::FLOAT32;
-    };
-    if (!has_header || std::none_of(header.fields.begin(), header.fields.end(), is_coordinate)) {
-      throw std::runtime_error(path + ": is not a .pcd file with x, y and z in single precision");
-    }
-  }
+  check_pcd(path);
   pcl::PointCloud<pcl::PointXYZ> points;
   try {
-    if (pcl::io::loadPCDFile(path, points) < 0) throw std::runtime_error(path + ": cannot be read as a .pcd file");
-  } catch (const pcl::PCLException& error) {
-    throw std::runtime_error(path + ": " + error.what());
+    if (pcl::io::loadPCDFile(path, points) < 0) throw std::runtime_error("PCL refuses it");
+  } catch (const std::bad_alloc&) {
+    throw std::runtime_error(path + ": not enough memory for it");
+  } catch (const std::exception& error) {
+    throw std::runtime_error(path + ": cannot be read as a .pcd file: " + error.what());
   }
   PointCloud cloud;
   cloud.reserve(points.size());
@@ -108,11 +103,13 @@ PointCloud read_pcd(const std::string& path) {
 void write_pcd(const std::string& path, const PointCloud& cloud) {
   const auto points = to_pcl(cloud);
   if (points->empty()) throw std::runtime_error(path + ": an empty cloud is not written");
+  PendingFile pending(path);
   try {
-    if (pcl::io::savePCDFileBinary(path, *points) == 0) return;
+    if (pcl::io::savePCDFileBinary(pending.path().string(), *points) != 0) throw pending.failure();
   } catch (const pcl::IOException&) {
+    throw pending.failure();
   }
-  throw std::runtime_error(path + ": cannot be written");
+  pending.commit();
 }
 
 }  // namespace urban_gnss

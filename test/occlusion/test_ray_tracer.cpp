@@ -361,5 +361,62 @@ TEST(PointCloud, FilesAreWrittenReadAndRefused) {
   EXPECT_THROW(read_pcd(path), std::runtime_error);
 }
 
+/// A cloud of two points in ASCII, with one entry of its header in place of another.
+std::string pcd_with(const std::string& entry, const std::string& data = "1 2 3\n4 5 6\n") {
+  std::string text;
+  for (const std::string line : {"VERSION 0.7", "FIELDS x y z", "SIZE 4 4 4", "TYPE F F F", "COUNT 1 1 1", "WIDTH 2",
+                                 "HEIGHT 1", "VIEWPOINT 0 0 0 1 0 0 0", "POINTS 2", "DATA ascii"}) {
+    const std::string name = line.substr(0, line.find(' ') + 1);
+    text += (entry.compare(0, name.size(), name) == 0 ? entry : line) + "\n";
+  }
+  return text + data;
+}
+
+TEST(PointCloud, HeadersThatLieAreRefusedBeforeTheyAreBelieved) {
+  const std::string path = (std::filesystem::path(::testing::TempDir()) / "urban_gnss_header_test.pcd").string();
+  const auto fault_of = [&](const std::string& text) -> std::string {
+    std::ofstream(path, std::ios::binary) << text;
+    try {
+      read_pcd(path);
+    } catch (const std::runtime_error& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_EQ(fault_of(pcd_with("VERSION .7")), "");
+  EXPECT_EQ(fault_of(pcd_with("HEIGHT 1\r")), "");
+  const std::pair<std::string, std::string> cases[] = {
+      {"COUNT 1 -1 1", "COUNT must be"},
+      {"COUNT 1 1", "COUNT must have a value for each"},
+      {"COUNT 1 1 99999999999", "COUNT must be"},
+      {"SIZE 4 0 4", "SIZE must be"},
+      {"SIZE 4 3 4", "no such TYPE and SIZE"},
+      {"TYPE F F G", "no such TYPE and SIZE"},
+      {"FIELDS x y", "must have a value for each"},
+      {"FIELDS x y w", "x, y and z"},
+      {"WIDTH -2", "WIDTH must be"},
+      {"WIDTH 3", "POINTS must be WIDTH times HEIGHT"},
+      {"WIDTH 4294967298", "WIDTH must be"},
+      {"HEIGHT 2147483647", "POINTS must be WIDTH times HEIGHT"},
+      {"DATA binary", "cut off"},
+      {"DATA binary_compressed", "cut off"},
+      {"DATA text", "DATA must be"},
+      {"VIEWPOINT 0", "VIEWPOINT"},
+  };
+  for (const auto& [entry, words] : cases) {
+    const std::string fault = fault_of(pcd_with(entry));
+    EXPECT_NE(fault.find(path), std::string::npos) << entry << ": " << fault;
+    EXPECT_NE(fault.find(words), std::string::npos) << entry << ": " << fault;
+  }
+  EXPECT_NE(fault_of(pcd_with("", "1 2 3\n4 5\n")).find("point 2 has 2 numbers"), std::string::npos);
+  EXPECT_NE(fault_of(pcd_with("", "1 2 3\n")).find("it has 1 points"), std::string::npos);
+  const std::string lying(
+      "\x10\x00\x00\x00\xff\xff\xff\x7f"
+      "0123456789abcdef",
+      24);
+  EXPECT_NE(fault_of(pcd_with("DATA binary_compressed", lying)).find("another size"), std::string::npos);
+  std::filesystem::remove(path);
+}
+
 }  // namespace
 }  // namespace urban_gnss
