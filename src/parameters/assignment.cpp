@@ -3,6 +3,24 @@
 #include <stdexcept>
 
 namespace urban_gnss {
+namespace {
+
+constexpr int kDeepest = 40;
+constexpr int kMostNodes = 1000000;
+
+/// Whether whoever walks through the tree comes to an end: an alias may stand for what holds it, and aliases of aliases
+/// for more than fits anywhere.
+bool is_finite(const YAML::Node& node, int depth, int& nodes) {
+  if (depth > kDeepest || ++nodes > kMostNodes) return false;
+  if (!node.IsMap() && !node.IsSequence()) return true;
+  for (const auto& each : node) {
+    if (node.IsMap() && !is_finite(each.first, depth + 1, nodes)) return false;
+    if (!is_finite(node.IsMap() ? each.second : each, depth + 1, nodes)) return false;
+  }
+  return true;
+}
+
+}  // namespace
 
 void assign(YAML::Node map, const std::string& text) {
   const auto equal = text.find('=');
@@ -52,7 +70,11 @@ YAML::Node load_map(const std::string& file) {
     throw std::runtime_error(file + ": cannot be read");
   } catch (const YAML::ParserException& error) {
     throw std::runtime_error(file + ":" + std::to_string(error.mark.line + 1) + ": " + error.msg);
+  } catch (const std::exception& error) {
+    throw std::runtime_error(file + ": is no YAML: " + error.what());
   }
+  int nodes = 0;
+  if (!is_finite(map, 0, nodes)) throw std::runtime_error(file + ": is nested too deeply, or has aliases without end");
   if (map.IsNull()) return YAML::Node(YAML::NodeType::Map);
   if (!map.IsMap()) throw std::runtime_error(file + ": must be a map of names to values");
   return map;
