@@ -1,7 +1,5 @@
 #pragma once
 
-#include <rosbag/bag.h>
-
 #include <algorithm>
 #include <filesystem>
 #include <functional>
@@ -12,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "files/output_bag.hpp"
 #include "urban_gnss_localization/evaluation/stamp_text.hpp"
 #include "urban_gnss_localization/ros/conversions.hpp"
 
@@ -35,7 +34,7 @@ class BagContents {
     const std::string topic = "/" + name;
     auto shared = std::make_shared<const Message>(message);
     entries_.push_back(
-        {stamp, [topic, shared](rosbag::Bag& bag, Stamp time) { bag.write(topic, to_ros_or_throw(time), *shared); }});
+        {stamp, [topic, shared](OutputBag& bag, Stamp time) { bag.write(topic, to_ros_or_throw(time), *shared); }});
     const auto known = std::find_if(topics_.begin(), topics_.end(), [&](const Topic& t) { return t.name == topic; });
     if (known == topics_.end()) {
       topics_.push_back({topic, 1, stamp, stamp});
@@ -49,10 +48,10 @@ class BagContents {
   /// Messages of one stamp are written in the order in which they were added, each a nanosecond after the one before
   /// it: who reads a bag gets messages of equal times in an order that rosbag does not define. Only the bag's times
   /// are moved, not the messages' own stamps.
-  void write(const std::filesystem::path& path) {
+  void write(const std::filesystem::path& path, const InputFiles& inputs) {
     std::stable_sort(entries_.begin(), entries_.end(),
                      [](const Entry& a, const Entry& b) { return a.stamp < b.stamp; });
-    rosbag::Bag bag(path.string(), rosbag::bagmode::Write);
+    OutputBag bag(path, inputs);
     Stamp last(0);
     for (const Entry& entry : entries_) {
       last = std::max(entry.stamp, last + Stamp(1));
@@ -74,7 +73,7 @@ class BagContents {
  private:
   struct Entry {
     Stamp stamp;
-    std::function<void(rosbag::Bag&, Stamp)> write;
+    std::function<void(OutputBag&, Stamp)> write;
   };
   struct Topic {
     std::string name;

@@ -14,7 +14,7 @@
 #include <sstream>
 
 #include "command_line.hpp"
-#include "output_file.hpp"
+#include "files/output_file.hpp"
 #include "overrides.hpp"
 #include "scenario_runs.hpp"
 #include "urban_gnss_localization/evaluation/report_json.hpp"
@@ -139,17 +139,17 @@ void print(const std::string& scenario, const nlohmann::json& json) {
   }
 }
 
-void write_series(const fs::path& directory, const BiasRun& run) {
+void write_series(const fs::path& directory, const InputFiles& inputs, const BiasRun& run) {
   const Stamp start = run.truth.front().stamp;
   const auto seconds = [&](Stamp stamp) { return to_seconds(stamp - start); };
-  write_file(directory / "truth.csv", [&](std::ostream& out) {
+  write_file(directory / "truth.csv", inputs, [&](std::ostream& out) {
     out << "t,x,y,phase\n" << std::setprecision(9);
     for (const TimedPose& pose : run.truth) {
       out << seconds(pose.stamp) << ',' << pose.pose.x << ',' << pose.pose.y << ',' << phase_of(run, pose.stamp)
           << '\n';
     }
   });
-  write_file(directory / "fixes.csv", [&](std::ostream& out) {
+  write_file(directory / "fixes.csv", inputs, [&](std::ostream& out) {
     out << "t,error_x,error_y\n" << std::setprecision(9);
     for (const auto& [stamp, error] : run.fix_errors)
       out << seconds(stamp) << ',' << error.x() << ',' << error.y() << '\n';
@@ -157,14 +157,14 @@ void write_series(const fs::path& directory, const BiasRun& run) {
   for (std::size_t i = 0; i < kBiasContestants.size(); ++i) {
     const BiasContestantRun& contestant = run.contestants[i];
     const std::string name = kBiasContestants[i].name;
-    write_file(directory / ("estimate_" + name + ".csv"), [&](std::ostream& out) {
+    write_file(directory / ("estimate_" + name + ".csv"), inputs, [&](std::ostream& out) {
       out << "t,x,y,error_m,sigma_m\n" << std::setprecision(9);
       for (const ErrorSample& sample : errors_at_truth(run.truth, contestant.estimate).samples) {
         out << seconds(sample.stamp) << ',' << sample.estimate.x << ',' << sample.estimate.y << ','
             << sample.position_error_m << ',' << sample.position_sigma_m << '\n';
       }
     });
-    write_file(directory / ("bias_" + name + ".csv"), [&](std::ostream& out) {
+    write_file(directory / ("bias_" + name + ".csv"), inputs, [&](std::ostream& out) {
       out << "t,bias_x,bias_y,sigma_x,sigma_y,significant,doubted\n" << std::setprecision(9);
       for (const BiasEstimate& bias : contestant.biases) {
         const FixDecision decision = bias.outcome.decision;
@@ -176,7 +176,7 @@ void write_series(const fs::path& directory, const BiasRun& run) {
   }
 }
 
-void run_all(const Options& options, const std::string& command) {
+void run_all(const Options& options, const std::string& command, const InputFiles& inputs) {
   BiasExperimentConditions conditions;
   read_overrides("--set", YAML::Node(YAML::NodeType::Map), options.overrides, conditions.filter,
                  conditions.localization);
@@ -197,10 +197,10 @@ void run_all(const Options& options, const std::string& command) {
     metrics["scenario_order"].push_back(name);
     metrics["scenarios"][name] = scenario_json(results[i]);
     print(name, metrics["scenarios"][name]);
-    if (!options.plots.empty()) write_series(fs::path(options.plots) / "data" / name, results[i].front());
+    if (!options.plots.empty()) write_series(fs::path(options.plots) / "data" / name, inputs, results[i].front());
   }
   const auto write_json = [&](const fs::path& file) {
-    write_file(file, [&](std::ostream& out) { out << metrics.dump(2) << '\n'; });
+    write_file(file, inputs, [&](std::ostream& out) { out << metrics.dump(2) << '\n'; });
   };
   if (!options.json_file.empty()) write_json(options.json_file);
   if (options.plots.empty()) return;
@@ -218,7 +218,10 @@ int main(int argc, char** argv) {
   line.add_seeds(options.runs.seed_count, options.runs.first_seed);
   line.add_set("--set", options.overrides, "a parameter of complementary_ekf or localization");
   line.add_json(options.json_file);
-  line.app().add_option("--plots", options.plots, "write figure, table and their data into this folder");
+  line.add_output_folder("--plots", options.plots, "write figure, table and their data into this folder");
   line.add_jobs(options.runs.jobs);
-  return line.run(argc, argv, [&] { run_all(options, line.command()); });
+  return line.run(argc, argv, [&] {
+    line.reads(options.runs.files());
+    run_all(options, line.command(), line.inputs());
+  });
 }

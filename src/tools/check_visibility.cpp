@@ -17,7 +17,7 @@
 
 #include "command_line.hpp"
 #include "csv_table.hpp"
-#include "output_file.hpp"
+#include "files/output_file.hpp"
 #include "urban_gnss_localization/geometry/angles.hpp"
 #include "urban_gnss_localization/gnss/satellite.hpp"
 #include "urban_gnss_localization/occlusion/kd_tree_ray_tracer.hpp"
@@ -171,7 +171,7 @@ double share_equal(const std::vector<bool>& a, const std::vector<bool>& b) {
   return static_cast<double>(equal) / static_cast<double>(a.size());
 }
 
-void check_visibility(const Options& options) {
+void check_visibility(const Options& options, const urban_gnss::InputFiles& inputs) {
   PointCloud cloud = urban_gnss::finite_points(urban_gnss::read_pcd(options.map));
   if (options.thin_m > 0.0) cloud = urban_gnss::voxel_filtered(cloud, options.thin_m);
   const std::vector<Row> rows = read_rows(options.table);
@@ -219,7 +219,7 @@ void check_visibility(const Options& options) {
   report["spacing_m"] = spacing_m;
   if (options.compare) report["tracers"] = std::move(all);
   if (!options.json.empty()) {
-    urban_gnss::write_file(options.json, [&](std::ostream& file) { file << report.dump(2) << '\n'; });
+    urban_gnss::write_file(options.json, inputs, [&](std::ostream& file) { file << report.dump(2) << '\n'; });
   }
 }
 
@@ -247,5 +247,5 @@ int main(int argc, char** argv) {
   app.add_option("--min-range", options.min_range_m, "nearer is no obstacle, m")->check(CLI::Range(0.0, 100.0));
   app.add_option("--max-range", options.max_range_m, "farther is none, m")->check(CLI::Range(100.0, 1e5));
   app.add_flag("--compare", options.compare, "trace with all tracers, and tell how far they agree");
-  return line.run(argc, argv, [&] { check_visibility(options); });
+  return line.run(argc, argv, [&] { check_visibility(options, line.inputs()); });
 }

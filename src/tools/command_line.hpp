@@ -3,15 +3,23 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <exception>
+#include <filesystem>
 #include <functional>
 #include <iostream>
+#include <new>
+#include <set>
+#include <stdexcept>
 #include <string>
 #include <thread>
 #include <vector>
 
+#include "files/input_files.hpp"
+#include "urban_gnss_localization/common/pending_file.hpp"
+
 namespace urban_gnss {
 
-/// The shell of a command-line program: --help, the options that several programs share, and what happens to errors.
+/// The shell of a command-line program: --help, the options that several programs share, the files that it must not
+/// write because it reads them, and what happens to errors.
 class CommandLine {
  public:
   /// `what` the program does, one sentence.
@@ -37,11 +45,34 @@ class CommandLine {
   void add_set(const std::string& option, std::vector<std::string>& overrides, const std::string& whose) {
     app_.add_option(option, overrides, whose + ", as docs/parameters.md names it, NAME=VALUE; repeatable");
   }
-  void add_json(std::string& file) { app_.add_option("--json", file, "write the results here"); }
+  /// A file to write. No two of them may be the same one, nor one that the program reads: all other options that name a
+  /// file or a folder are taken for what it reads.
+  CLI::Option* add_output(const std::string& name, std::string& file, const std::string& what) {
+    CLI::Option* const option = app_.add_option(name, file, what);
+    outputs_.push_back(option);
+    return option;
+  }
+  /// A folder to write into. What is in it is no input.
+  CLI::Option* add_output_folder(const std::string& name, std::string& folder, const std::string& what) {
+    CLI::Option* const option = app_.add_option(name, folder, what);
+    output_folders_.push_back(option);
+    return option;
+  }
+  void add_json(std::string& file) { add_output("--json", file, "write the results here"); }
   void add_jobs(int& threads) {
     threads = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
     app_.add_option("--jobs", threads, "threads")->check(CLI::PositiveNumber);
   }
+
+  /// A file, or the files of a folder, that the program reads although no option names it.
+  void reads(const std::filesystem::path& path) {
+    inputs_.add(path);
+    check_outputs();
+  }
+  void reads(const std::vector<std::filesystem::path>& paths) {
+    for (const std::filesystem::path& path : paths) reads(path);
+  }
+  const InputFiles& inputs() const { return inputs_; }
 
   /// How the program was called, for reports.
   const std::string& command() const { return command_; }
@@ -55,8 +86,15 @@ class CommandLine {
     }
     command_ = "rosrun urban_gnss_localization " + program_;
     for (int i = 1; i < argc; ++i) command_ += std::string(" ") + argv[i];
+    remove_pending_files_on_signals();
     try {
+      find_inputs();
+      check_outputs();
       work();
+    } catch (const std::bad_alloc&) {
+      std::cerr << program_ << ": not enough memory; the command was " << command_.substr(command_.find(program_))
+                << '\n';
+      return 1;
     } catch (const std::exception& error) {
       std::cerr << program_ << ": " << error.what() << '\n';
       return 1;
@@ -65,9 +103,41 @@ class CommandLine {
   }
 
  private:
+  static bool has(const std::vector<const CLI::Option*>& options, const CLI::Option* option) {
+    return std::find(options.begin(), options.end(), option) != options.end();
+  }
+
+  /// All values of options that are files or folders, also behind a `=`.
+  void find_inputs() {
+    for (const CLI::Option* option : app_.get_options()) {
+      if (has(outputs_, option) || has(output_folders_, option)) continue;
+      for (const std::string& value : option->results()) {
+        if (value.empty()) continue;
+        inputs_.add(value);
+        inputs_.add(value.substr(value.find('=') + 1));
+      }
+    }
+  }
+  void check_outputs() const {
+    std::set<std::filesystem::path> known;
+    for (const CLI::Option* option : outputs_) {
+      if (option->count() == 0 || option->results().back().empty()) continue;
+      const std::filesystem::path path = inputs_.checked(option->results().back());
+      std::error_code error;
+      const auto whole = std::filesystem::weakly_canonical(path, error);
+      const bool is_file = !std::filesystem::exists(path, error) || std::filesystem::is_regular_file(path, error);
+      if (is_file && !known.insert(whole).second) {
+        throw std::runtime_error(option->get_name() + " " + path.string() + ": another option writes this file, too");
+      }
+    }
+  }
+
   std::string program_;
   std::string command_;
   CLI::App app_;
+  std::vector<const CLI::Option*> outputs_;
+  std::vector<const CLI::Option*> output_folders_;
+  InputFiles inputs_;
 };
 
 }  // namespace urban_gnss

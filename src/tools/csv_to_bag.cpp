@@ -2,7 +2,6 @@
 
 #include <geometry_msgs/TwistWithCovarianceStamped.h>
 #include <nav_msgs/Odometry.h>
-#include <rosbag/bag.h>
 #include <sensor_msgs/Imu.h>
 #include <sensor_msgs/NavSatFix.h>
 #include <tf2_msgs/TFMessage.h>
@@ -303,7 +302,8 @@ void add_truth(const CsvTable& table, BagContents& contents) {
   }
 }
 
-void convert(const fs::path& folder, const std::string& gnss_file, const OdometryNoise& noise, const fs::path& output) {
+void convert(const fs::path& folder, const std::string& gnss_file, const OdometryNoise& noise, const fs::path& output,
+             const urban_gnss::InputFiles& inputs) {
   const GeodeticPosition origin = read_origin(folder / "meta.json");
   const CsvTable odometry = read_table(folder / "odom.csv");
   const CsvTable fixes = read_table(folder / gnss_file);
@@ -337,7 +337,7 @@ void convert(const fs::path& folder, const std::string& gnss_file, const Odometr
   add_odometry(odometry, noise, contents);
   add_fixes(fixes, LocalFrame(origin), contents);
   add_optional(false);
-  contents.write(output);
+  contents.write(output, inputs);
   contents.print_summary(std::cout);
   std::cout << output.string() << ": " << fs::file_size(output) << " bytes\n";
 }
@@ -355,7 +355,7 @@ int main(int argc, char** argv) {
                   "folder with meta.json, odom.csv and the fixes; sats.csv, gnss_vel.csv, imu.csv and truth.csv are used "
                   "where present")
       ->required();
-  line.app().add_option("OUT", output, "bag to write")->required();
+  line.add_output("OUT", output, "bag to write")->required();
   line.app().add_option("--gnss-file", gnss_file, "file in DIR with the fixes");
   line.app()
       .add_option("--speed-sigma", noise.speed_mps, "declared noise of the odometry's speed, m/s")
@@ -366,5 +366,8 @@ int main(int argc, char** argv) {
   line.app()
       .add_option("--yaw-rate-sigma", noise.yaw_rate_rad_s, "declared noise of its yaw rate, rad/s")
       ->check(CLI::Range(1e-6, 1e6));
-  return line.run(argc, argv, [&] { convert(folder, gnss_file, noise, output); });
+  return line.run(argc, argv, [&] {
+    line.reads(fs::path(folder) / gnss_file);
+    convert(folder, gnss_file, noise, output, line.inputs());
+  });
 }

@@ -1,8 +1,6 @@
 // Scores the estimates and the raw fixes in bags against ground truth: a table, JSON, error series and plots.
 
 #include <nav_msgs/Odometry.h>
-#include <rosbag/bag.h>
-#include <rosbag/view.h>
 #include <sensor_msgs/NavSatFix.h>
 
 #include <Eigen/Core>
@@ -23,7 +21,8 @@
 #include <vector>
 
 #include "command_line.hpp"
-#include "output_file.hpp"
+#include "files/bag_reader.hpp"
+#include "files/output_file.hpp"
 #include "urban_gnss_localization/evaluation/report_json.hpp"
 #include "urban_gnss_localization/evaluation/stamp_text.hpp"
 #include "urban_gnss_localization/evaluation/trajectory_errors.hpp"
@@ -37,7 +36,9 @@
 namespace {
 
 namespace fs = std::filesystem;
+using urban_gnss::BagReader;
 using urban_gnss::ErrorSample;
+using urban_gnss::InputFiles;
 using urban_gnss::LocalFrame;
 using urban_gnss::Stamp;
 using urban_gnss::Summary;
@@ -74,20 +75,10 @@ std::string as_file_name(std::string name) {
 
 /// Calls `use` with every message of the topic, written with or without a leading slash. False where there is none.
 template <class Message, class Use>
-bool for_each_message(const rosbag::Bag& bag, const std::string& topic, Use use) {
-  const std::string name = without_leading_slash(topic);
-  rosbag::View view(bag, rosbag::TopicQuery(std::vector<std::string>{name, "/" + name}));
-  bool found = false;
-  for (const rosbag::MessageInstance& instance : view) {
-    const auto message = instance.instantiate<Message>();
-    if (!message) {
-      throw std::runtime_error(bag.getFileName() + ": topic " + topic + " holds " + instance.getDataType() + ", not " +
-                               ros::message_traits::DataType<Message>::value());
-    }
-    use(*message);
-    found = true;
-  }
-  return found;
+bool for_each_message(const BagReader& bag, const std::string& topic, Use use) {
+  urban_gnss::BagMessages messages(bag, {without_leading_slash(topic)});
+  while (const auto message = messages.next()) use(*urban_gnss::expect<Message>(*message));
+  return messages.size() > 0;
 }
 
 struct OdometryTrack {
@@ -96,7 +87,7 @@ struct OdometryTrack {
 };
 
 /// Empty where the bag has no such topic.
-std::optional<OdometryTrack> read_odometry(const rosbag::Bag& bag, const std::string& topic) {
+std::optional<OdometryTrack> read_odometry(const BagReader& bag, const std::string& topic) {
   OdometryTrack track;
   std::size_t not_finite = 0;
   const bool found = for_each_message<nav_msgs::Odometry>(bag, topic, [&](const nav_msgs::Odometry& odometry) {
@@ -106,13 +97,13 @@ std::optional<OdometryTrack> read_odometry(const rosbag::Bag& bag, const std::st
   });
   if (!found) return std::nullopt;
   if (not_finite > 0) {
-    std::cerr << bag.getFileName() << ": topic " << topic << ": " << not_finite << " poses are not finite\n";
+    std::cerr << bag.name() << ": topic " << topic << ": " << not_finite << " poses are not finite\n";
   }
   urban_gnss::sort_by_stamp(track.trajectory);
   return track;
 }
 
-std::optional<LocalFrame> read_datum(const rosbag::Bag& bag) {
+std::optional<LocalFrame> read_datum(const BagReader& bag) {
   std::optional<LocalFrame> frame;
   for_each_message<sensor_msgs::NavSatFix>(bag, urban_gnss::topics::kDatum, [&](const sensor_msgs::NavSatFix& datum) {
     frame.emplace(urban_gnss::GeodeticPosition{datum.latitude, datum.longitude, datum.altitude});
@@ -121,7 +112,7 @@ std::optional<LocalFrame> read_datum(const rosbag::Bag& bag) {
 }
 
 /// The fixes as poses without a yaw; those without a position are left out.
-Trajectory read_fixes(const rosbag::Bag& bag, const std::string& topic, const LocalFrame& frame) {
+Trajectory read_fixes(const BagReader& bag, const std::string& topic, const LocalFrame& frame) {
   Trajectory fixes;
   for_each_message<sensor_msgs::NavSatFix>(bag, topic, [&](const sensor_msgs::NavSatFix& fix) {
     if (fix.status.status < sensor_msgs::NavSatStatus::STATUS_FIX) return;
@@ -150,8 +141,9 @@ std::string cell(double value) {
   return text;
 }
 
-void write_error_series(const fs::path& path, const std::vector<ErrorSample>& samples, Stamp start) {
-  urban_gnss::write_file(path, [&](std::ostream& file) {
+void write_error_series(const fs::path& path, const InputFiles& inputs, const std::vector<ErrorSample>& samples,
+                        Stamp start) {
+  urban_gnss::write_file(path, inputs, [&](std::ostream& file) {
     file << "t,position_error_m,heading_error_rad,est_x,est_y,truth_x,truth_y,sigma_m,nees\n";
     for (const ErrorSample& sample : samples) {
       file << urban_gnss::format_stamp(sample.stamp - start) << ',' << cell(sample.position_error_m) << ','
@@ -162,8 +154,9 @@ void write_error_series(const fs::path& path, const std::vector<ErrorSample>& sa
   });
 }
 
-void write_fix_series(const fs::path& path, const std::vector<ErrorSample>& samples, Stamp start) {
-  urban_gnss::write_file(path, [&](std::ostream& file) {
+void write_fix_series(const fs::path& path, const InputFiles& inputs, const std::vector<ErrorSample>& samples,
+                      Stamp start) {
+  urban_gnss::write_file(path, inputs, [&](std::ostream& file) {
     file << "t,fix_x,fix_y,error_m\n";
     for (const ErrorSample& sample : samples) {
       file << urban_gnss::format_stamp(sample.stamp - start) << ',' << cell(sample.estimate.x) << ','
@@ -172,8 +165,8 @@ void write_fix_series(const fs::path& path, const std::vector<ErrorSample>& samp
   });
 }
 
-void write_trajectory(const fs::path& path, const Trajectory& trajectory) {
-  urban_gnss::write_file(path, [&](std::ostream& file) { urban_gnss::write_tum(file, trajectory); });
+void write_trajectory(const fs::path& path, const InputFiles& inputs, const Trajectory& trajectory) {
+  urban_gnss::write_file(path, inputs, [&](std::ostream& file) { urban_gnss::write_tum(file, trajectory); });
 }
 
 /// What was scored, for other tools that read TUM files. Fixes, which have no yaw, get zero.
@@ -189,8 +182,18 @@ Trajectory scored_poses(const std::vector<ErrorSample>& samples) {
   return poses;
 }
 
+/// Says where an estimate ends before the truth does, as that of a run that was cut off.
+void warn_of_missing_end(const std::string& name, const Trajectory& truth, const Trajectory& estimate, double gap_s) {
+  if (truth.empty() || estimate.empty()) return;
+  const double missing_s = urban_gnss::to_seconds(truth.back().stamp - estimate.back().stamp);
+  if (missing_s <= gap_s) return;
+  std::cerr << name << ": ends " << std::fixed << std::setprecision(1) << missing_s << " s before the truth, which has "
+            << urban_gnss::to_seconds(truth.back().stamp - truth.front().stamp)
+            << " s: its errors are of the part before\n";
+}
+
 /// Errors of every estimate topic in the bag that was asked for.
-std::vector<Run> evaluate_estimates(const rosbag::Bag& bag, const std::string& stem, const OdometryTrack& truth,
+std::vector<Run> evaluate_estimates(const BagReader& bag, const std::string& stem, const OdometryTrack& truth,
                                     const Options& options) {
   std::vector<Run> runs;
   for (const std::string& topic : options.estimate_topics) {
@@ -200,6 +203,7 @@ std::vector<Run> evaluate_estimates(const rosbag::Bag& bag, const std::string& s
     if (estimate->frame != truth.frame) {
       std::cerr << name << ": in frame " << estimate->frame << ", but the truth is in " << truth.frame << '\n';
     }
+    warn_of_missing_end(name, truth.trajectory, estimate->trajectory, options.max_gap_s);
     runs.push_back({name, urban_gnss::errors_at_truth(truth.trajectory, estimate->trajectory,
                                                       urban_gnss::from_seconds(options.max_gap_s))});
   }
@@ -207,7 +211,7 @@ std::vector<Run> evaluate_estimates(const rosbag::Bag& bag, const std::string& s
 }
 
 /// Errors of the raw fixes; nothing where there are none, or no datum to place them by.
-std::optional<Run> evaluate_fixes(const rosbag::Bag& bag, const rosbag::Bag& truth_bag, const std::string& stem,
+std::optional<Run> evaluate_fixes(const BagReader& bag, const BagReader& truth_bag, const std::string& stem,
                                   const OdometryTrack& truth, const Options& options) {
   const std::string name = stem + "/" + without_leading_slash(options.fix_topic);
   auto frame = read_datum(bag);
@@ -222,11 +226,11 @@ std::optional<Run> evaluate_fixes(const rosbag::Bag& bag, const rosbag::Bag& tru
 }
 
 /// Scores one bag and writes its series. The truth comes from `truth_bag`, which may be the same one.
-std::vector<Run> evaluate_bag(const std::string& path, const rosbag::Bag& bag, const rosbag::Bag& truth_bag,
-                              const Options& options) {
+std::vector<Run> evaluate_bag(const std::string& path, const BagReader& bag, const BagReader& truth_bag,
+                              const Options& options, const InputFiles& inputs) {
   const auto truth = read_odometry(truth_bag, options.truth_topic);
   if (!truth) {
-    throw std::runtime_error(truth_bag.getFileName() + ": no ground truth on topic " + options.truth_topic +
+    throw std::runtime_error(truth_bag.name() + ": no ground truth on topic " + options.truth_topic +
                              " (another bag's is taken with --truth)");
   }
   const std::string stem = fs::path(path).stem().string();
@@ -237,14 +241,14 @@ std::vector<Run> evaluate_bag(const std::string& path, const rosbag::Bag& bag, c
 
   const Stamp start = truth->trajectory.front().stamp;
   const fs::path output(options.output);
-  write_trajectory(output / ("truth_" + as_file_name(stem) + ".tum"), truth->trajectory);
+  write_trajectory(output / ("truth_" + as_file_name(stem) + ".tum"), inputs, truth->trajectory);
   for (const Run& run : runs) {
     if (run.errors.samples.empty()) std::cerr << run.name << ": no stamp in common with the truth\n";
     const std::string name = as_file_name(run.name);
-    write_error_series(output / "data" / ("errors_" + name + ".csv"), run.errors.samples, start);
-    write_trajectory(output / ("errors_" + name + ".tum"), scored_poses(run.errors.samples));
+    write_error_series(output / "data" / ("errors_" + name + ".csv"), inputs, run.errors.samples, start);
+    write_trajectory(output / ("errors_" + name + ".tum"), inputs, scored_poses(run.errors.samples));
     // With every run, as each one's plot shows the fixes that it had.
-    if (fixes) write_fix_series(output / "data" / ("fixes_" + name + ".csv"), fixes->errors.samples, start);
+    if (fixes) write_fix_series(output / "data" / ("fixes_" + name + ".csv"), inputs, fixes->errors.samples, start);
   }
   return runs;
 }
@@ -283,13 +287,13 @@ void print_table(std::ostream& out, const std::vector<Run>& runs) {
   out << "errors in m; heading_deg is the heading's root mean square error; a consistent estimate has a NEES of 3\n";
 }
 
-void write_metrics(const fs::path& path, const std::vector<Run>& runs) {
+void write_metrics(const fs::path& path, const InputFiles& inputs, const std::vector<Run>& runs) {
   nlohmann::json metrics = {{"runs", nlohmann::json::object()}};
   for (const Run& run : runs) metrics["runs"][run.name] = urban_gnss::to_json(run.errors.summary);
-  urban_gnss::write_file(path, [&](std::ostream& file) { file << metrics.dump(2) << '\n'; });
+  urban_gnss::write_file(path, inputs, [&](std::ostream& file) { file << metrics.dump(2) << '\n'; });
 }
 
-void evaluate(const Options& options) {
+void evaluate(const Options& options, const InputFiles& inputs) {
   std::set<std::string> stems;
   for (const std::string& bag : options.bags) {
     const std::string stem = fs::path(bag).stem().string();
@@ -297,19 +301,18 @@ void evaluate(const Options& options) {
       throw std::runtime_error("two bags are called " + stem + ": their results would share one name");
     }
   }
-  fs::create_directories(fs::path(options.output) / "data");
-  std::optional<rosbag::Bag> truth_bag;
+  std::optional<BagReader> truth_bag;
   if (!options.truth_bag.empty()) truth_bag.emplace(options.truth_bag);
 
   std::vector<Run> runs;
   for (const std::string& bag : options.bags) {
-    const rosbag::Bag opened(bag);
-    for (Run& run : evaluate_bag(bag, opened, truth_bag ? *truth_bag : opened, options)) {
+    const BagReader opened(bag);
+    for (Run& run : evaluate_bag(bag, opened, truth_bag ? *truth_bag : opened, options, inputs)) {
       runs.push_back(std::move(run));
     }
   }
   print_table(std::cout, runs);
-  write_metrics(fs::path(options.output) / "metrics.json", runs);
+  write_metrics(fs::path(options.output) / "metrics.json", inputs, runs);
   if (options.plots) urban_gnss::run_plotter("plot_evaluation.py", options.output);
 }
 
@@ -321,7 +324,8 @@ int main(int argc, char** argv) {
   urban_gnss::CommandLine line("evaluate", "Scores estimates and raw fixes in bags against ground truth.");
   CLI::App& app = line.app();
   app.add_option("BAG", options.bags, "bags to evaluate")->required()->check(CLI::ExistingFile);
-  app.add_option("--output", options.output, "folder for metrics.json, data/, trajectories and plots")->required();
+  line.add_output_folder("--output", options.output, "folder for metrics.json, data/, trajectories and plots")
+      ->required();
   app.add_option("--truth", options.truth_bag, "bag with the ground truth; default: each bag's own")
       ->check(CLI::ExistingFile);
   app.add_option("--truth-topic", options.truth_topic, "nav_msgs/Odometry");
@@ -339,6 +343,6 @@ int main(int argc, char** argv) {
   app.add_flag("--no-plots", no_plots, "write no plots");
   return line.run(argc, argv, [&] {
     options.plots = !no_plots;
-    evaluate(options);
+    evaluate(options, line.inputs());
   });
 }

@@ -1,12 +1,15 @@
 #pragma once
 
 #include <ros/package.h>
+#include <yaml-cpp/yaml.h>
 
 #include <algorithm>
 #include <filesystem>
 #include <stdexcept>
 #include <string>
 #include <vector>
+
+#include "urban_gnss_localization/parameters/assignment.hpp"
 
 namespace urban_gnss {
 
@@ -33,6 +36,25 @@ inline std::filesystem::path find_scenario(const std::string& name) {
   std::sort(names.begin(), names.end());
   for (const std::string& other : names) known += ", " + other;
   throw std::runtime_error(name + ": neither a file nor one of the scenarios paper_field" + known);
+}
+
+/// The files that a scenario's file names, relative to its folder.
+inline void find_files(const YAML::Node& node, const std::filesystem::path& folder,
+                       std::vector<std::filesystem::path>& files) {
+  if (node.IsScalar() && !node.Scalar().empty()) {
+    std::error_code error;
+    const std::filesystem::path file = folder / node.Scalar();
+    if (std::filesystem::is_regular_file(file, error)) files.push_back(file);
+  } else if (node.IsSequence() || node.IsMap()) {
+    for (const auto& each : node) find_files(node.IsMap() ? each.second : each, folder, files);
+  }
+}
+
+/// The scenario's file, and those that it names. Throws what find_scenario and load_map throw.
+inline std::vector<std::filesystem::path> files_of_scenario(const std::string& name) {
+  std::vector<std::filesystem::path> files{find_scenario(name)};
+  find_files(load_map(files.front().string()), files.front().parent_path(), files);
+  return files;
 }
 
 }  // namespace urban_gnss

@@ -14,7 +14,7 @@
 #include <sstream>
 
 #include "command_line.hpp"
-#include "output_file.hpp"
+#include "files/output_file.hpp"
 #include "overrides.hpp"
 #include "scenario_runs.hpp"
 #include "urban_gnss_localization/evaluation/report_json.hpp"
@@ -191,7 +191,7 @@ nlohmann::json report_faults(const std::vector<Contender>& contenders,
 /// Runs the experiment in all scenarios with all seeds, reports on each scenario, and writes the file of --json.
 template <class Experiment, class Report>
 void run_and_report(const Options& options, const std::string& command, const Experiment& experiment,
-                    const Report& report) {
+                    const Report& report, const InputFiles& inputs) {
   const auto start = std::chrono::steady_clock::now();
   const auto runs = run_scenarios(options.runs, experiment);
   nlohmann::json metrics;
@@ -204,17 +204,18 @@ void run_and_report(const Options& options, const std::string& command, const Ex
     metrics["scenarios"][name] = report(runs[i]);
   }
   if (options.json_file.empty()) return;
-  write_file(options.json_file, [&](std::ostream& out) { out << metrics.dump(2) << '\n'; });
+  write_file(options.json_file, inputs, [&](std::ostream& out) { out << metrics.dump(2) << '\n'; });
 }
 
 using OnProgress = std::function<void(double)>;
 
 void run_plain(const Options& options, const std::string& command, const std::vector<Contender>& contenders,
-               const LocalizerExperimentConditions& conditions) {
+               const LocalizerExperimentConditions& conditions, const InputFiles& inputs) {
   const auto experiment = [&](const Scenario& scenario, const OnProgress& on_progress) {
     return run_localizer_experiment(scenario, contenders, conditions, on_progress);
   };
-  run_and_report(options, command, experiment, [&](const auto& drives) { return report_errors(contenders, drives); });
+  run_and_report(
+      options, command, experiment, [&](const auto& drives) { return report_errors(contenders, drives); }, inputs);
   std::cout
       << "\nheading: root mean square; a consistent estimate has a NEES of 3; coverage in %; diverged: drives with "
          "an error beyond "
@@ -223,11 +224,12 @@ void run_plain(const Options& options, const std::string& command, const std::ve
 }
 
 void run_faults(const Options& options, const std::string& command, const std::vector<Contender>& contenders,
-                const LocalizerExperimentConditions& conditions) {
+                const LocalizerExperimentConditions& conditions, const InputFiles& inputs) {
   const auto experiment = [&](const Scenario& scenario, const OnProgress& on_progress) {
     return run_fault_experiment(scenario, contenders, conditions, on_progress);
   };
-  run_and_report(options, command, experiment, [&](const auto& drives) { return report_faults(contenders, drives); });
+  run_and_report(
+      options, command, experiment, [&](const auto& drives) { return report_faults(contenders, drives); }, inputs);
   std::cout << "\nThe worst of the seeds, from the fault's onset on. unhealthy in: s from the onset; -: never. worst "
                "healthy: the largest error with a healthy status. back in: s from the fault's end until the estimate "
                "was healthy and good (error below "
@@ -235,11 +237,11 @@ void run_faults(const Options& options, const std::string& command, const std::v
             << " s; -: the fault does not end. inside 95: share of the truth in the 95 % ellipse, mean of the seeds\n";
 }
 
-void run_all(const Options& options, const std::string& command) {
+void run_all(const Options& options, const std::string& command, const InputFiles& inputs) {
   const YAML::Node sections = read_sections(options.overrides, standard_localizers());
   LocalizerExperimentConditions conditions = read_conditions(sections);
   conditions.fault_onset_s = options.fault_onset_s;
-  (options.faults ? run_faults : run_plain)(options, command, select_contenders(options, sections), conditions);
+  (options.faults ? run_faults : run_plain)(options, command, select_contenders(options, sections), conditions, inputs);
 }
 
 /// With --faults, what the command line leaves open: every localizer without the occlusion node, on a drive of minutes.
@@ -276,6 +278,7 @@ int main(int argc, char** argv) {
   line.app().add_option("--fault-onset", options.fault_onset_s, "s after the start")->check(CLI::NonNegativeNumber);
   return line.run(argc, argv, [&] {
     if (options.faults) choose_fault_runs(line.app(), options);
-    run_all(options, line.command());
+    line.reads(options.runs.files());
+    run_all(options, line.command(), line.inputs());
   });
 }

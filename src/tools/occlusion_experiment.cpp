@@ -16,7 +16,7 @@
 #include "command_line.hpp"
 #include "find_scenario.hpp"
 #include "occlusion_series.hpp"
-#include "output_file.hpp"
+#include "files/output_file.hpp"
 #include "overrides.hpp"
 #include "scenario_runs.hpp"
 #include "urban_gnss_localization/evaluation/report_json.hpp"
@@ -241,7 +241,7 @@ void print(const std::string& scenario, const nlohmann::json& json) {
   std::cout << '\n';
 }
 
-void run_all(const Options& options, const std::string& command) {
+void run_all(const Options& options, const std::string& command, const InputFiles& inputs) {
   const OcclusionExperimentConditions conditions = read_conditions(options);
   const auto start = std::chrono::steady_clock::now();
   const std::vector<std::vector<OcclusionRun>> results =
@@ -257,10 +257,10 @@ void run_all(const Options& options, const std::string& command) {
     const std::string name = fs::path(options.runs.scenarios[i]).stem().string();
     metrics["scenarios"][name] = scenario_json(results[i]);
     print(name, metrics["scenarios"][name]);
-    if (!options.series_directory.empty()) write_series(options.series_directory, name, results[i].front());
+    if (!options.series_directory.empty()) write_series(options.series_directory, inputs, name, results[i].front());
   }
   if (!options.json_file.empty())
-    write_file(options.json_file, [&](std::ostream& out) { out << metrics.dump(2) << '\n'; });
+    write_file(options.json_file, inputs, [&](std::ostream& out) { out << metrics.dump(2) << '\n'; });
 }
 
 }  // namespace
@@ -279,8 +279,12 @@ int main(int argc, char** argv) {
   line.add_set("--set", options.occlusion_overrides, "a parameter of the occlusion node");
   line.add_set("--ukf-set", options.ukf_overrides, "a parameter of ukf or localization");
   line.add_json(options.json_file);
-  line.app().add_option("--series", options.series_directory,
-                        "write the first seed's fixes and trajectories here as CSV, for figures");
+  line.add_output_folder("--series", options.series_directory,
+                         "write the first seed's fixes and trajectories here as CSV, for figures");
   line.add_jobs(options.runs.jobs);
-  return line.run(argc, argv, [&] { run_all(options, line.command()); });
+  return line.run(argc, argv, [&] {
+    line.reads(options.runs.files());
+    if (options.occlusion_file.empty()) line.reads(package_path() / "config");
+    run_all(options, line.command(), line.inputs());
+  });
 }

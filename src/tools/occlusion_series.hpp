@@ -4,15 +4,16 @@
 #include <filesystem>
 #include <string>
 
-#include "output_file.hpp"
+#include "files/output_file.hpp"
 #include "urban_gnss_localization/experiments/occlusion_experiment.hpp"
 
 namespace urban_gnss {
 
 /// Writes `trajectory` as t, x, y, yaw (s since `start`, m, rad), at most five poses a second.
-inline void write_trajectory(const std::filesystem::path& path, const Trajectory& trajectory, Stamp start) {
+inline void write_trajectory(const std::filesystem::path& path, const InputFiles& inputs, const Trajectory& trajectory,
+                             Stamp start) {
   constexpr Stamp kInterval = std::chrono::milliseconds(200);
-  write_file(path, [&](std::ostream& out) {
+  write_file(path, inputs, [&](std::ostream& out) {
     out << "t,x,y,yaw\n";
     Stamp last = start - kInterval;
     for (const TimedPose& pose : trajectory) {
@@ -26,10 +27,11 @@ inline void write_trajectory(const std::filesystem::path& path, const Trajectory
 /// What figures 5 to 7 of Maier and Kleiner 2010 show of one run: DIRECTORY/fixes_<scenario>.csv with the fixes, their
 /// errors and each model's sigma_p (m) and outcome, and trajectory_<scenario>_<name>.csv. Throws what write_file
 /// throws.
-inline void write_series(const std::filesystem::path& directory, const std::string& scenario, const OcclusionRun& run) {
+inline void write_series(const std::filesystem::path& directory, const InputFiles& inputs, const std::string& scenario,
+                         const OcclusionRun& run) {
   if (run.truth.empty()) return;
   const Stamp start = run.truth.front().stamp;
-  write_file(directory / ("fixes_" + scenario + ".csv"), [&](std::ostream& out) {
+  write_file(directory / ("fixes_" + scenario + ".csv"), inputs, [&](std::ostream& out) {
     out << "t,x,y,error,sigma_claimed";
     for (const ComparedModel& each : kComparedModels) out << ",sigma_" << each.name << ",good_" << each.name;
     out << '\n';
@@ -44,7 +46,7 @@ inline void write_series(const std::filesystem::path& directory, const std::stri
     }
   });
   const auto write = [&](const std::string& name, const Trajectory& trajectory) {
-    write_trajectory(directory / ("trajectory_" + scenario + "_" + name + ".csv"), trajectory, start);
+    write_trajectory(directory / ("trajectory_" + scenario + "_" + name + ".csv"), inputs, trajectory, start);
   };
   write("truth", run.truth);
   write("odometry", run.odometry);

@@ -17,7 +17,7 @@
 
 #include "command_line.hpp"
 #include "find_scenario.hpp"
-#include "output_file.hpp"
+#include "files/output_file.hpp"
 #include "parallel_jobs.hpp"
 #include "urban_gnss_localization/evaluation/report_json.hpp"
 #include "urban_gnss_localization/evaluation/statistics.hpp"
@@ -60,8 +60,12 @@ struct RunErrors {
   double runtime_s = 0.0;
 };
 
+fs::path config_folder(const Options& options) {
+  return options.config.empty() ? package_path() / "config" / "paper_field" : fs::path(options.config);
+}
+
 PaperExperimentConditions load_conditions(const Options& options) {
-  const fs::path directory = options.config.empty() ? package_path() / "config" / "paper_field" : fs::path(options.config);
+  const fs::path directory = config_folder(options);
   YAML::Node files;
   for (const char* name : kPaperFileNames) files[name] = load_map((directory / (std::string(name) + ".yaml")).string());
   for (const std::string& text : options.overrides) {
@@ -99,19 +103,19 @@ std::vector<PaperMethod> select_methods(const std::vector<std::string>& names) {
 /// Writes what the figures of one run need: the whole trajectory, and the particles at four places of the last lap.
 class TraceWriter {
  public:
-  TraceWriter(const fs::path& directory, const std::string& method, int last_lap)
+  TraceWriter(const fs::path& directory, const InputFiles& inputs, const std::string& method, int last_lap)
       : last_lap_(last_lap),
-        trajectory_(directory / ("trajectory_" + method + ".csv")),
-        snapshots_(directory / ("snapshots_" + method + ".csv")),
-        particles_(directory / ("particles_" + method + ".csv")) {
+        trajectory_file_(directory / ("trajectory_" + method + ".csv"), inputs),
+        snapshots_file_(directory / ("snapshots_" + method + ".csv"), inputs),
+        particles_file_(directory / ("particles_" + method + ".csv"), inputs) {
     trajectory_ << "t,lap,true_x,true_y,true_yaw,est_x,est_y,est_yaw,fix_x,fix_y,in_shadow,bias_x,bias_y,radius,ess\n";
     snapshots_ << "snapshot,t,true_x,true_y,true_yaw,est_x,est_y,est_yaw,fix_x,fix_y,radius\n";
     particles_ << "snapshot,x,y,yaw,weight\n";
-    for (std::ofstream* out : {&trajectory_, &snapshots_, &particles_}) *out << std::setprecision(9);
+    for (std::ostream* out : {&trajectory_, &snapshots_, &particles_}) *out << std::setprecision(9);
   }
 
   void write(const PaperStep& s, const ParticleSet* particles) {
-    const auto poses = [&](std::ofstream& out) -> std::ofstream& {
+    const auto poses = [&](std::ostream& out) -> std::ostream& {
       out << s.truth.x << ',' << s.truth.y << ',' << s.truth.yaw << ',' << s.estimate.x << ',' << s.estimate.y << ','
           << s.estimate.yaw << ',' << s.fix.position.x() << ',' << s.fix.position.y() << ',';
       return out;
@@ -131,14 +135,20 @@ class TraceWriter {
       ++next_;
     }
   }
+  void close() {
+    for (OutputFile* file : {&trajectory_file_, &snapshots_file_, &particles_file_}) file->close();
+  }
 
  private:
   static constexpr std::array<double, 4> kPlaces{60.0, 110.0, 180.0, 250.0};  ///< deg, bearing from the origin
   int last_lap_;
   std::size_t next_ = 0;
-  std::ofstream trajectory_;
-  std::ofstream snapshots_;
-  std::ofstream particles_;
+  OutputFile trajectory_file_;
+  OutputFile snapshots_file_;
+  OutputFile particles_file_;
+  std::ostream& trajectory_{trajectory_file_.stream()};
+  std::ostream& snapshots_{snapshots_file_.stream()};
+  std::ostream& particles_{particles_file_.stream()};
 };
 
 RunErrors run(const PaperMethod& method, PaperExperimentConditions conditions, int seed, TraceWriter* trace) {
@@ -261,7 +271,7 @@ using Results = std::vector<std::vector<RunErrors>>;  ///< by method and seed
 
 /// Every method on every seed; a method's first run leaves its trace in `data` where there are to be plots.
 Results run_methods(const Options& options, const PaperExperimentConditions& conditions,
-                    const std::vector<PaperMethod>& methods, const fs::path& data) {
+                    const std::vector<PaperMethod>& methods, const fs::path& data, const InputFiles& inputs) {
   const auto seeds = static_cast<std::size_t>(options.seeds);
   Results results(methods.size(), std::vector<RunErrors>(seeds));
   run_jobs(
@@ -271,9 +281,10 @@ Results run_methods(const Options& options, const PaperExperimentConditions& con
         const std::size_t s = job % seeds;
         std::unique_ptr<TraceWriter> trace;
         if (s == 0 && !options.plots.empty()) {
-          trace = std::make_unique<TraceWriter>(data, methods[m].name, options.laps - 1);
+          trace = std::make_unique<TraceWriter>(data, inputs, methods[m].name, options.laps - 1);
         }
         results[m][s] = run(methods[m], conditions, options.first_seed + static_cast<int>(s), trace.get());
+        if (trace) trace->close();
         on_progress(1.0);
       });
   return results;
@@ -296,25 +307,25 @@ nlohmann::json conditions_json(const PaperExperimentConditions& conditions) {
 }
 
 void write_plots(const Options& options, const PaperExperimentConditions& conditions,
-                 const std::vector<PaperMethod>& methods, const Results& results, const fs::path& data) {
-  write_file(data / "targets.csv", [&](std::ostream& out) {
+                 const std::vector<PaperMethod>& methods, const Results& results, const fs::path& data,
+                 const InputFiles& inputs) {
+  write_file(data / "targets.csv", inputs, [&](std::ostream& out) {
     out << "x,y\n";
     for (const auto& target : conditions.controller.target_points()) out << target.x() << ',' << target.y() << '\n';
   });
   for (std::size_t m = 0; m < methods.size(); ++m) {
-    write_file(data / ("errors_over_seeds_" + methods[m].name + ".csv"),
+    write_file(data / ("errors_over_seeds_" + methods[m].name + ".csv"), inputs,
                [&](std::ostream& out) { write_curves(out, results[m], conditions.field.interval); });
   }
   run_plotter("plot_paper_experiment.py", options.plots);
 }
 
-void run_all(const Options& options, const std::string& command) {
+void run_all(const Options& options, const std::string& command, const InputFiles& inputs) {
   const PaperExperimentConditions conditions = load_conditions(options);
   const std::vector<PaperMethod> methods = select_methods(options.methods);
   const fs::path data = fs::path(options.plots) / "data";
-  if (!options.plots.empty()) fs::create_directories(data);
   const auto start = std::chrono::steady_clock::now();
-  const Results results = run_methods(options, conditions, methods, data);
+  const Results results = run_methods(options, conditions, methods, data, inputs);
 
   nlohmann::json metrics;
   metrics["command"] = command;
@@ -330,12 +341,12 @@ void run_all(const Options& options, const std::string& command) {
   }
   print_table(metrics);
   const auto write_json = [&](const fs::path& file) {
-    write_file(file, [&](std::ostream& out) { out << metrics.dump(2) << '\n'; });
+    write_file(file, inputs, [&](std::ostream& out) { out << metrics.dump(2) << '\n'; });
   };
   if (!options.json_file.empty()) write_json(options.json_file);
   if (options.plots.empty()) return;
   write_json(fs::path(options.plots) / "metrics.json");
-  write_plots(options, conditions, methods, results, data);
+  write_plots(options, conditions, methods, results, data, inputs);
 }
 
 }  // namespace
@@ -355,7 +366,7 @@ int main(int argc, char** argv) {
   line.add_set("--set", options.overrides, "FILE. and a parameter of a file in the folder of --config");
   app.add_option("--config", options.config, "folder of the YAML files; default: config/paper_field");
   line.add_json(options.json_file);
-  app.add_option("--plots", options.plots, "write report, figures and their data into this folder");
+  line.add_output_folder("--plots", options.plots, "write report, figures and their data into this folder");
   app.add_flag("--open-loop", options.open_loop, "steer on the truth instead of the estimate");
   line.add_jobs(options.jobs);
   return line.run(argc, argv, [&] {
@@ -363,6 +374,7 @@ int main(int argc, char** argv) {
       options.methods.clear();
       for (const auto& method : paper_methods()) options.methods.push_back(method.name);
     }
-    run_all(options, line.command());
+    line.reads(config_folder(options));
+    run_all(options, line.command(), line.inputs());
   });
 }

@@ -7,7 +7,7 @@
 #include <sstream>
 
 #include "command_line.hpp"
-#include "output_file.hpp"
+#include "files/output_file.hpp"
 #include "urban_gnss_localization/localizers/registry.hpp"
 #include "urban_gnss_localization/parameters/parameter_list.hpp"
 #include "urban_gnss_localization/ros/comparison_node_parameters.hpp"
@@ -116,7 +116,7 @@ std::vector<Page> all_pages(const LocalizerRegistry& localizers) {
 
 void write_pages(const fs::path& directory) {
   for (const Page& page : all_pages(standard_localizers())) {
-    write_file(directory / page.file, [&](std::ostream& out) { out << page.text; });
+    write_file(directory / page.file, InputFiles(), [&](std::ostream& out) { out << page.text; });
   }
 }
 
@@ -137,7 +137,7 @@ int main(int argc, char** argv) {
   std::string write_directory;
   std::string check_directory;
   CommandLine line("parameters", "Prints the parameters of every node: place, default, unit, range, meaning.");
-  line.app().add_option("--write", write_directory,
+  line.add_output_folder("--write", write_directory,
                         "renew config/*.yaml and docs/parameters.md below this folder, the package's");
   line.app().add_option("--check", check_directory, "fail where one of these files is stale");
   return line.run(argc, argv, [&] {

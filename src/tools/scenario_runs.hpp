@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <filesystem>
 #include <functional>
 #include <string>
 #include <type_traits>
@@ -24,6 +25,15 @@ struct ScenarioRuns {
   std::vector<int> seeds() const {
     std::vector<int> all;
     for (int i = 0; i < seed_count; ++i) all.push_back(first_seed + i);
+    return all;
+  }
+  /// The files that the runs read.
+  std::vector<std::filesystem::path> files() const {
+    std::vector<std::filesystem::path> all;
+    for (const std::string& scenario : scenarios) {
+      const auto of_one = files_of_scenario(scenario);
+      all.insert(all.end(), of_one.begin(), of_one.end());
+    }
     return all;
   }
   Scenario load(const std::string& scenario, int seed) const {

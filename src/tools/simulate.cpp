@@ -1,7 +1,6 @@
 // Drives a scenario offline and writes what the robot's sensors publish into a bag, with the ground truth beside it.
 // The same scenario and seed give the same bag, byte for byte.
 
-#include <rosbag/bag.h>
 #include <sensor_msgs/NavSatFix.h>
 
 #include <chrono>
@@ -13,8 +12,9 @@
 #include <sstream>
 
 #include "command_line.hpp"
+#include "files/output_bag.hpp"
+#include "files/output_file.hpp"
 #include "find_scenario.hpp"
-#include "output_file.hpp"
 #include "urban_gnss_localization/common/progress.hpp"
 #include "urban_gnss_localization/parameters/assignment.hpp"
 #include "urban_gnss_localization/parameters/parameter_reader.hpp"
@@ -97,10 +97,7 @@ Run make_run(const Options& options, const SimulationFrames& frames) {
 /// are published at once: who reads a bag gets messages of equal times in an order that rosbag does not define.
 class BagWriter {
  public:
-  explicit BagWriter(const fs::path& file) {
-    if (file.has_parent_path()) fs::create_directories(file.parent_path());
-    bag_.open(file.string(), rosbag::bagmode::Write);
-  }
+  BagWriter(const fs::path& file, const InputFiles& inputs) : bag_(file, inputs) {}
   template <class Message>
   void write(const std::string& topic, Stamp published, const Message& message) {
     last_ = std::max(published, last_ + Stamp(1));
@@ -109,7 +106,7 @@ class BagWriter {
   void close() { bag_.close(); }
 
  private:
-  rosbag::Bag bag_;
+  OutputBag bag_;
   Stamp last_{0};
 };
 
@@ -139,7 +136,7 @@ void print_summary(const ReceiverSummary& summary, std::ostream& out) {
   }
 }
 
-void run(const Options& options) {
+void run(const Options& options, const InputFiles& inputs) {
   const SimulationFrames frames;
   Run run = make_run(options, frames);
   Simulator& simulator = *run.simulator;
@@ -147,7 +144,7 @@ void run(const Options& options) {
   std::unique_ptr<BagWriter> bag;
   const Stamp begin = simulator.now();
   if (!options.output.empty()) {
-    bag = std::make_unique<BagWriter>(options.output);
+    bag = std::make_unique<BagWriter>(options.output, inputs);
     bag->write(topics::kDatum, begin, to_message(run.datum, to_ros(begin), frames.base.map));
     if (run.mounting) bag->write("tf_static", begin, *run.mounting);
   }
@@ -188,7 +185,7 @@ void run(const Options& options) {
     json["scenario"] = run.name;
     json["seed"] = run.seed;
     json["duration_s"] = simulated_s;
-    write_file(options.json_file, [&](std::ostream& out) { out << json.dump(2) << '\n'; });
+    write_file(options.json_file, inputs, [&](std::ostream& out) { out << json.dump(2) << '\n'; });
   }
 }
 
@@ -201,11 +198,14 @@ int main(int argc, char** argv) {
   line.app()
       .add_option("--scenario", options.scenario, "a scenario's file, or the name of one that comes with the package")
       ->required();
-  line.app().add_option("--output", options.output, "bag to write");
+  line.add_output("--output", options.output, "bag to write");
   line.add_json(options.json_file);
   line.app().add_option("--seed", options.seed, "seed of all noise; default: the scenario's");
   line.add_duration(options.duration_s);
   line.app().add_option("--set", options.overrides, "one value, SECTION.NAME=VALUE; repeatable");
   line.app().add_flag("--without-lidar", options.without_lidar, "no scans, which take most of the time and of the bag");
-  return line.run(argc, argv, [&] { run(options); });
+  return line.run(argc, argv, [&] {
+    line.reads(files_of_scenario(options.scenario));
+    run(options, line.inputs());
+  });
 }

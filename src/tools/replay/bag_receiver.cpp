@@ -6,8 +6,6 @@
 #include <utility>
 #include <vector>
 
-#include "bag_messages.hpp"
-#include "urban_gnss_localization/receivers/receiver_input.hpp"
 #include "urban_gnss_localization/ros/conversions.hpp"
 #include "urban_gnss_localization/ros/receiver_messages.hpp"
 
@@ -20,20 +18,19 @@ using urban_gnss_localization::SatelliteArray;
 using TopicsInBag = std::map<std::string, const ReceiverTopic*>;
 
 /// All receivers of the preset's kind in the bag, by their namespaces.
-std::map<std::string, TopicsInBag> find_receivers(const rosbag::Bag& bag, const ReceiverPreset& preset) {
+std::map<std::string, TopicsInBag> find_receivers(const BagReader& bag, const ReceiverPreset& preset) {
   std::map<std::string, TopicsInBag> receivers;
-  rosbag::View all(bag);
-  for (const rosbag::ConnectionInfo* connection : all.getConnections()) {
-    const std::string full = without_leading_slash(connection->topic);
+  for (const BagConnection& connection : bag.connections()) {
+    const std::string full = without_leading_slash(connection.topic);
     for (const ReceiverTopic& topic : preset.topics) {
       const auto ns = namespace_of(full, topic);
-      if (ns && is_type_of(topic, connection->datatype)) receivers[*ns][full] = &topic;
+      if (ns && is_type_of(topic, connection.type)) receivers[*ns][full] = &topic;
     }
   }
   return receivers;
 }
 
-TopicsInBag find_receiver(const rosbag::Bag& bag, const ReceiverPreset& preset, const ReplayOptions& options) {
+TopicsInBag find_receiver(const BagReader& bag, const ReceiverPreset& preset, const ReplayOptions& options) {
   const std::map<std::string, TopicsInBag> receivers = find_receivers(bag, preset);
   const std::string wanted = without_leading_slash(options.receiver_ns);
   if (!options.receiver_ns.empty()) {
@@ -49,57 +46,68 @@ TopicsInBag find_receiver(const rosbag::Bag& bag, const ReceiverPreset& preset, 
     if (best.size() == 1) return receivers.at(best.front());
     std::string names;
     for (const std::string& ns : best) names += " " + ns;
-    throw std::runtime_error(options.input + " has several receivers of the kind " + preset.name +
+    throw std::runtime_error(bag.name() + " has several receivers of the kind " + preset.name +
                              ": say which by --receiver-ns, one of" + names);
   }
-  throw std::runtime_error(options.input + " has no topic of the receiver " + preset.name +
+  throw std::runtime_error(bag.name() + " has no topic of the receiver " + preset.name +
                            (options.receiver_ns.empty() ? "" : " in " + options.receiver_ns) + "; it has" +
-                           topics_of(bag));
+                           bag.topics());
 }
 
 }  // namespace
 
-ReceiverRecording decode_receiver(const rosbag::Bag& bag, const ReplayOptions& options) {
-  const ReceiverPreset& preset = find_receiver_preset(options.receiver);
-  const TopicsInBag topics = find_receiver(bag, preset, options);
-  std::vector<std::string> names;
-  ReceiverRecording recording;
-  recording.source = preset.name + ":";
-  for (const ReceiverTopic& topic : preset.topics) {
-    for (const auto& [name, found] : topics) {
+BagReceiver::BagReceiver(const BagReader& bag, const ReplayOptions& options)
+    : topics_(find_receiver(bag, find_receiver_preset(options.receiver), options)),
+      source_(options.receiver + ":"),
+      input_(find_receiver_preset(options.receiver)) {
+  for (const ReceiverTopic& topic : find_receiver_preset(options.receiver).topics) {
+    for (const auto& [name, found] : topics_) {
       if (found != &topic) continue;
-      names.push_back(name);
-      recording.source += " " + name;
+      names_.push_back(name);
+      source_ += " " + name;
+      left_ += bag.count(name);
     }
   }
-  ReceiverInput input(preset);
-  Stamp last(0);
-  const auto take = [&] {
-    ReceiverOutput output = input.take();
-    if (!output.empty()) recording.outputs.push_back({last, std::move(output)});
-  };
-  for (const rosbag::MessageInstance& message : ordered_messages(bag, names)) {
-    last = to_stamp(message.getTime());
-    const ReceiverTopic& topic = *topics.at(without_leading_slash(message.getTopic()));
-    add_message(message, message.getTopic(), topic, last, input);
-    take();
+}
+
+ReceiverOutput BagReceiver::add(const BagMessage& message) {
+  const ReceiverTopic& topic = *topics_.at(without_leading_slash(message.getTopic()));
+  add_message(message, message.getTopic(), topic, message.time(), input_);
+  if (left_ > 0 && --left_ == 0) input_.finish();
+  return input_.take();
+}
+
+std::size_t BagReceiver::unreadable() const {
+  std::size_t sum = 0;
+  for (const auto& [topic, count] : input_.unreadable()) sum += count;
+  return sum;
+}
+
+ReceiverRecording decode_receiver(const BagReader& bag, const ReplayOptions& options) {
+  BagReceiver receiver(bag, options);
+  ReceiverRecording recording;
+  recording.source = receiver.source();
+  BagMessages messages(bag, receiver.names());
+  while (const auto message = messages.next()) {
+    ReceiverOutput output = receiver.add(*message);
+    if (!output.empty()) recording.outputs.push_back({message->time(), std::move(output)});
   }
-  input.finish();
-  take();
-  recording.counts = input.counts();
-  recording.antenna_frame = input.frame_id();
-  for (const auto& [topic, count] : input.unreadable()) recording.unreadable += count;
+  recording.counts = receiver.counts();
+  recording.antenna_frame = receiver.antenna_frame();
+  recording.unreadable = receiver.unreadable();
   return recording;
 }
 
-ReceiverRecording read_receiver_topics(const rosbag::Bag& bag, const ReplayOptions& options) {
+ReceiverRecording read_receiver_topics(const BagReader& bag, const ReplayOptions& options) {
   const std::string fix = without_leading_slash(options.fix_topic);
   const std::string velocity = without_leading_slash(options.velocity_topic);
   const std::string satellites = without_leading_slash(options.satellites_topic);
   ReceiverRecording recording;
   recording.source = "topics: " + fix + " " + velocity + " " + satellites;
   ReceiverCounter counter;
-  for (const rosbag::MessageInstance& message : ordered_messages(bag, {fix, velocity, satellites})) {
+  BagMessages messages(bag, {fix, velocity, satellites});
+  while (const auto next = messages.next()) {
+    const BagMessage& message = *next;
     const std::string name = without_leading_slash(message.getTopic());
     ReceiverOutput output;
     if (name == fix) {
@@ -112,7 +120,7 @@ ReceiverRecording read_receiver_topics(const rosbag::Bag& bag, const ReplayOptio
       output.satellites.push_back(to_satellite_epoch(*expect<SatelliteArray>(message)));
     }
     counter.add(output);
-    recording.outputs.push_back({to_stamp(message.getTime()), std::move(output)});
+    recording.outputs.push_back({message.time(), std::move(output)});
   }
   recording.counts = counter.counts();
   return recording;

@@ -8,13 +8,13 @@
 #include <nlohmann/json.hpp>
 
 #include "command_line.hpp"
-#include "output_file.hpp"
+#include "files/output_file.hpp"
+#include "find_scenario.hpp"
 #include "replay_inputs.hpp"
 #include "replay_run.hpp"
 #include "replay_settings.hpp"
 #include "urban_gnss_localization/common/progress.hpp"
 #include "urban_gnss_localization/evaluation/report_json.hpp"
-#include "urban_gnss_localization/evaluation/tum.hpp"
 #include "urban_gnss_localization/ros/conversions.hpp"
 
 namespace urban_gnss {
@@ -59,27 +59,50 @@ void print_occlusion(const nlohmann::json& report, const std::string& topic) {
 }
 
 void print_summary(const ReplayRun& replay, const nlohmann::json& metrics, double wall_s, double bag_s) {
-  std::cout << replay.estimate().size() << " estimates in " << std::fixed << std::setprecision(2) << wall_s << " s ("
+  std::cout << replay.estimates() << " estimates in " << std::fixed << std::setprecision(2) << wall_s << " s ("
             << std::setprecision(0) << bag_s / std::max(wall_s, 1e-3) << " times real time)\n";
   std::cout << "fixes:";
   for (const auto& [decision, count] : replay.decisions()) std::cout << "  " << decision << " " << count;
   std::cout << '\n';
+  for (const auto& [kind, texts] : replay.rejections().kinds()) {
+    std::cout << "  " << texts.count << " times " << texts.first << '\n';
+  }
   if (!metrics.contains("errors")) return;
-  const auto& position = metrics["errors"]["position_m"];
-  if (position["median"].is_null()) return;
-  std::cout << std::setprecision(2) << "position error, m: median " << position["median"].get<double>() << ", mean "
-            << position["mean"].get<double>() << ", 95 % " << position["p95"].get<double>() << ", max "
-            << position["max"].get<double>() << "; the truth was covered to "
-            << 100.0 * metrics["errors"]["coverage"].get<double>() << " %\n";
+  const auto& errors = metrics["errors"];
+  const auto print = [](const nlohmann::json& value, double factor = 1.0) {
+    if (value.is_null()) {
+      std::cout << '-';
+    } else {
+      std::cout << factor * value.get<double>();
+    }
+  };
+  if (errors["position_m"]["median"].is_null()) return;
+  std::cout << std::setprecision(2) << "position error, m";
+  constexpr std::pair<const char*, const char*> kShown[] = {
+      {": median ", "median"}, {", mean ", "mean"}, {", 95 % ", "p95"}, {", max ", "max"}};
+  for (const auto& [name, key] : kShown) {
+    std::cout << name;
+    print(errors["position_m"][key]);
+  }
+  std::cout << "; the truth was covered to ";
+  print(errors["coverage"], 100.0);
+  std::cout << " %\n";
 }
 
-nlohmann::json metrics_of(const ReplayOptions& options, const ReplaySettings& settings, const ReplayRun& replay) {
+/// "drive_0.bag, drive_1.bag".
+std::string names_of_inputs(const ReplayOptions& options) {
+  std::string names;
+  for (const std::string& bag : options.bags) names += (names.empty() ? "" : ", ") + fs::path(bag).filename().string();
+  return names.empty() ? fs::path(options.nmea).filename().string() : names;
+}
+
+nlohmann::json metrics_of(const ReplayOptions& options, const ReplaySettings& settings, ReplayRun& replay) {
   const LocalizationReport report = replay.pipeline().report();
-  nlohmann::json metrics = {{"bag", fs::path(options.input.empty() ? options.nmea : options.input).filename().string()},
+  nlohmann::json metrics = {{"bag", names_of_inputs(options)},
                             {"localizer", replay.pipeline().localizer().name()},
                             {"mode", replay.pipeline().localizer().mode()},
                             {"seed", settings.seed},
-                            {"estimates", replay.estimate().size()},
+                            {"estimates", replay.estimates()},
                             {"decisions", replay.decisions()},
                             {"fixes_with_ranges", report.fixes_with_ranges},
                             {"velocities_used", report.velocities_used}};
@@ -89,19 +112,10 @@ nlohmann::json metrics_of(const ReplayOptions& options, const ReplaySettings& se
   }
   metrics["time_to_start_s"] = number_or_null(replay.time_to_start_s());
   metrics["time_to_heading_s"] = number_or_null(replay.time_to_heading_s());
-  if (const auto reference = replay.truth()) {
+  if (const auto reference = replay.take_truth()) {
     metrics["errors"] = to_json(errors_at_truth(*reference, replay.estimate()).summary);
   }
   return metrics;
-}
-
-void write_results(const ReplayOptions& options, const nlohmann::json& metrics, const ReplayRun& replay) {
-  if (!options.json_file.empty()) {
-    write_file(options.json_file, [&](std::ostream& out) { out << metrics.dump(2) << '\n'; });
-  }
-  if (!options.tum_file.empty()) {
-    write_file(options.tum_file, [&](std::ostream& out) { write_tum(out, replay.estimate()); });
-  }
 }
 
 /// Throws std::runtime_error where the other options leave nothing to weigh, or nothing to build a map with.
@@ -114,31 +128,31 @@ void check_occlusion(const ReplayOptions& options) {
   }
 }
 
-void run(const ReplayOptions& options, const LocalizerRegistry& localizers) {
+void run(const ReplayOptions& options, const LocalizerRegistry& localizers, const InputFiles& files) {
   const ReplaySettings settings = read_settings(options, localizers);
-  const ReplayInputs inputs(options);
+  ReplayInputs inputs(options);
 
   // Where nobody tells how the robot lies in the odometry's frame, the odometry does.
   const bool odometry_is_tf = settings.occlusion && !inputs.has_transforms_from(settings.occlusion->frames.odom);
-  ReplayRun replay(options, settings, odometry_is_tf);
-  Progress progress(inputs.all().size(), "messages");
+  ReplayRun replay(options, settings, files, {inputs.truths(), inputs.odometries(), odometry_is_tf});
+  Progress progress(inputs.size(), "messages");
   const auto start = std::chrono::steady_clock::now();
   std::size_t done = 0;
-  for (const ReplayInput& input : inputs.all()) {
-    input.give_to(replay);
-    progress.report(++done);
-  }
+  while (inputs.give_next(replay)) progress.report(++done);
   progress.finish();
   replay.finish();
   const double wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 
   nlohmann::json metrics = metrics_of(options, settings, replay);
   if (options.without_odometry) metrics["odometry"] = "constant-velocity model";
-  if (inputs.receiver()) metrics["receiver"] = to_json(*inputs.receiver());
+  const std::optional<ReceiverRecording> receiver = inputs.receiver();
+  if (receiver) metrics["receiver"] = to_json(*receiver);
   if (replay.occlusion()) metrics["occlusion"] = replay.occlusion()->report();
-  write_results(options, metrics, replay);
+  if (!options.json_file.empty()) {
+    write_file(options.json_file, files, [&](std::ostream& out) { out << metrics.dump(2) << '\n'; });
+  }
   print_summary(replay, metrics, wall_s, inputs.duration_s());
-  if (inputs.receiver()) print_receiver(*inputs.receiver());
+  if (receiver) print_receiver(*receiver);
   if (replay.occlusion()) {
     print_occlusion(metrics["occlusion"], options.points_topic);
     if (odometry_is_tf)
@@ -146,11 +160,12 @@ void run(const ReplayOptions& options, const LocalizerRegistry& localizers) {
   }
   if (options.without_odometry) {
     std::cout << "no odometry: constant-velocity model, of the receiver's "
-              << (inputs.receiver()->counts.velocities > 0 ? "velocities" : "fixes")
-              << "; the yaw is the course over ground\n";
+              << (receiver->counts.velocities > 0 ? "velocities" : "fixes") << "; the yaw is the course over ground\n";
   }
-  if (replay.estimate().empty()) {
-    throw std::runtime_error("no estimate: still waiting for " + replay.pipeline().waiting_for());
+  if (replay.estimates() == 0) {
+    const std::string missing = replay.pipeline().waiting_for();
+    throw std::runtime_error("no estimate: " +
+                             (missing.empty() ? "nothing came after the start" : "still waiting for " + missing));
   }
 }
 
@@ -165,7 +180,7 @@ int replay_main(int argc, char** argv, const LocalizerRegistry& localizers) {
   CommandLine line("replay",
                    "Runs a bag through a localizer offline; the same input, parameters and seed give the same output.");
   CLI::App& app = line.app();
-  auto* input = app.add_option("bag", options.input, "the bag to read");
+  app.add_option("bag", options.bags, "the bag to read; several are parts of one recording");
   bool only_names = false;
   bool only_receivers = false;
   std::string odometry = "topic";
@@ -177,9 +192,9 @@ int replay_main(int argc, char** argv, const LocalizerRegistry& localizers) {
   line.add_set(
       "--set", options.overrides,
       "a parameter of the localizer, or after gps_bias. of the bias filter, after occlusion. of occlusion_node");
-  app.add_option("--output", options.output,
-                 "bag to write: odometry/filtered, gps/filtered, gps/bias, status, tf; with --occlusion "
-                 "gps/fix_weighted and gps/visibility too");
+  line.add_output("--output", options.output,
+                  "bag to write: odometry/filtered, gps/filtered, gps/bias, status, tf; with --occlusion "
+                  "gps/fix_weighted and gps/visibility too");
   app.add_option("--fix-topic", options.fix_topic, "sensor_msgs/NavSatFix");
   app.add_option("--odom-topic", options.odom_topic, "nav_msgs/Odometry");
   const auto* velocity_topic = app.add_option(
@@ -220,15 +235,15 @@ int replay_main(int argc, char** argv, const LocalizerRegistry& localizers) {
       ->check(CLI::PositiveNumber);
   app.add_option("--seed", options.seed, "seed of the random numbers; default: as in the parameters");
   line.add_json(options.json_file);
-  app.add_option("--tum", options.tum_file, "write the trajectory here (TUM format, ENU about the datum)");
+  line.add_output("--tum", options.tum_file, "write the trajectory here (TUM format, ENU about the datum)");
   return line.run(argc, argv, [&] {
     if (only_names) return print_variants(localizers);
     if (only_receivers) {
       std::cout << describe_receiver_presets();
       return;
     }
-    if (input->count() == 0 && options.nmea.empty()) throw std::runtime_error("which bag? See --help");
-    if (input->count() == 0 && odometry != "none") {
+    if (options.bags.empty() && options.nmea.empty()) throw std::runtime_error("which bag? See --help");
+    if (options.bags.empty() && odometry != "none") {
       throw std::runtime_error("--nmea needs a bag with odometry, or --odom none");
     }
     options.wants_velocity = velocity_topic->count() > 0 && !options.velocity_topic.empty();
@@ -236,7 +251,8 @@ int replay_main(int argc, char** argv, const LocalizerRegistry& localizers) {
     options.wants_imu = imu_topic->count() > 0 && !options.imu_topic.empty();
     options.without_odometry = odometry == "none";
     if (options.occlusion) check_occlusion(options);
-    run(options, localizers);
+    if (!options.robot.empty()) line.reads(package_path() / "config" / "robots");
+    run(options, localizers, line.inputs());
   });
 }
 

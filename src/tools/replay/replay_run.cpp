@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <iomanip>
 #include <iostream>
 #include <limits>
 #include <utility>
 
+#include "urban_gnss_localization/evaluation/tum.hpp"
 #include "urban_gnss_localization/geometry/angles.hpp"
 #include "urban_gnss_localization/ros/conversions.hpp"
 #include "urban_gnss_localization/ros/receiver_messages.hpp"
@@ -17,20 +17,26 @@ namespace urban_gnss {
 namespace {
 
 constexpr double kNever = std::numeric_limits<double>::quiet_NaN();
+constexpr std::size_t kMostLines = 3;  // of one kind; the others are counted
+constexpr std::size_t kMostReserved = 1000000;  // whatever a damaged index says
 constexpr double kKnownHeading_rad = degrees_to_radians(10.0);
 
 }  // namespace
 
-ReplayRun::ReplayRun(const ReplayOptions& options, const ReplaySettings& settings, bool odometry_is_tf)
+ReplayRun::ReplayRun(const ReplayOptions& options, const ReplaySettings& settings, const InputFiles& files,
+                     const RecordingFacts& recording)
     : shell_(settings.localizer.shell),
       pipeline_(shell_.localization, settings.localizer.localizer->make()),
       sensor_frames_(shell_.frames, shell_.wants_antenna_from_tf()),
-      bias_responder_(settings.gps_bias.bias.bias) {
-  if (settings.occlusion) occlusion_.emplace(*settings.occlusion, odometry_is_tf);
-  if (options.output.empty()) return;
-  const std::filesystem::path path(options.output);
-  if (path.has_parent_path()) std::filesystem::create_directories(path.parent_path());
-  bag_.open(options.output, rosbag::bagmode::Write);
+      bias_responder_(settings.gps_bias.bias.bias),
+      has_truth_(recording.truths > 0) {
+  if (has_truth_) {
+    truth_.reserve(std::min(recording.truths, kMostReserved));
+    estimate_.reserve(std::min(recording.odometries, kMostReserved));
+  }
+  if (settings.occlusion) occlusion_.emplace(*settings.occlusion, recording.odometry_is_tf);
+  if (!options.output.empty()) bag_ = std::make_unique<OutputBag>(options.output, files);
+  if (!options.tum_file.empty()) tum_ = std::make_unique<OutputFile>(options.tum_file, files);
 }
 
 void ReplayRun::add_odometry(const OdometrySample& sample) {
@@ -91,9 +97,7 @@ void ReplayRun::add_fix(const sensor_msgs::NavSatFix& message) {
 }
 
 void ReplayRun::take_weighed() {
-  for (const PipelineEvent& event : occlusion_->take_events()) {
-    if (said_.insert(event.text).second) print({event});
-  }
+  print(occlusion_->take_events());
   for (const WeighedFix& weighed : occlusion_->take()) {
     const Stamp stamp = to_stamp(weighed.fix.header.stamp);
     write(topics::kWeightedFix, stamp, weighed.fix);
@@ -147,28 +151,25 @@ void ReplayRun::finish() {
     occlusion_->finish();
     take_weighed();
   }
-  if (bag_.isOpen()) bag_.close();
+  for (const auto& [kind, texts] : events_.kinds()) {
+    if (texts.count > kMostLines) std::cerr << texts.count - kMostLines << " more like: " << texts.first << '\n';
+  }
+  if (bag_) bag_->close();
+  if (tum_) tum_->close();
 }
 
-double ReplayRun::time_to_start_s() const {
-  return estimate_.empty() ? kNever : to_seconds(estimate_.front().stamp - *begin_);
+double ReplayRun::since_begin_s(const std::optional<Stamp>& stamp) const {
+  return stamp && begin_ ? to_seconds(*stamp - *begin_) : kNever;
 }
 
-double ReplayRun::time_to_heading_s() const {
-  const auto known = std::find_if(estimate_.begin(), estimate_.end(), [](const TimedPose& each) {
-    return std::sqrt(each.covariance(2, 2)) < kKnownHeading_rad;
-  });
-  return known == estimate_.end() ? kNever : to_seconds(known->stamp - *begin_);
-}
-
-std::optional<Trajectory> ReplayRun::truth() const {
+std::optional<Trajectory> ReplayRun::take_truth() {
   if (truth_.empty() || !pipeline_.frame()) return std::nullopt;
   if (!bag_datum_) {
     std::cerr << "replay: the bag has a truth but no gps/datum; the truth is taken to be in the frame of the datum\n";
-    return truth_;
+    return std::move(truth_);
   }
   const LocalFrame theirs(*bag_datum_);
-  Trajectory moved = truth_;
+  Trajectory moved = std::move(truth_);
   for (TimedPose& timed : moved) {
     const Eigen::Vector3d point = pipeline_.frame()->to_local(theirs.to_geodetic({timed.pose.x, timed.pose.y, 0.0}));
     timed.pose.x = point.x();
@@ -182,25 +183,37 @@ void ReplayRun::settle() {
   write_biases(bias_responder_.answer(pipeline_));
   print(sensor_frames_.take_events());
   print(pipeline_.take_events());
-  for (const LocalizationOutput& output : pipeline_.take_outputs()) {
-    estimate_.push_back({output.stamp, output.estimate.pose, output.estimate.covariance});
-    write(topics::kEstimate, output.stamp, to_message(output, shell_.frames));
-    write(topics::kFilteredFix, output.stamp, to_fix_message(output, *pipeline_.frame(), shell_.frames));
-    tf2_msgs::TFMessage tf;
-    tf.transforms.push_back(to_map_to_odom(output, shell_.frames, shell_.transform_time_offset));
-    write(kTf, output.stamp, tf);
-    if (occlusion_) occlusion_->add_estimate(output, tf.transforms.front());
-  }
+  for (const LocalizationOutput& output : pipeline_.take_outputs()) take(output);
   write_biases(pipeline_.take_bias_estimates());
   const std::vector<FixOutcome> outcomes = pipeline_.take_outcomes();
-  for (const FixOutcome& outcome : outcomes) ++decisions_[to_string(outcome.decision)];
+  for (const FixOutcome& outcome : outcomes) {
+    const std::string decision = to_string(outcome.decision);
+    ++decisions_[decision];
+    if (is_rejected(outcome.decision)) rejections_.add(decision + ": " + outcome.reason);
+  }
   for (const auto& status : to_status_messages(pipeline_, outcomes, to_ros(newest_), shell_.frames.map)) {
     write(topics::kStatus, newest_, status);
   }
 }
 
-void ReplayRun::print(const std::vector<PipelineEvent>& events) const {
+void ReplayRun::take(const LocalizationOutput& output) {
+  const TimedPose pose{output.stamp, output.estimate.pose, output.estimate.covariance};
+  ++estimates_;
+  if (!first_estimate_) first_estimate_ = output.stamp;
+  if (!first_heading_ && std::sqrt(pose.covariance(2, 2)) < kKnownHeading_rad) first_heading_ = output.stamp;
+  if (has_truth_) estimate_.push_back(pose);
+  if (tum_) write_tum(tum_->stream(), {pose});
+  write(topics::kEstimate, output.stamp, to_message(output, shell_.frames));
+  write(topics::kFilteredFix, output.stamp, to_fix_message(output, *pipeline_.frame(), shell_.frames));
+  tf2_msgs::TFMessage tf;
+  tf.transforms.push_back(to_map_to_odom(output, shell_.frames, shell_.transform_time_offset));
+  write(kTf, output.stamp, tf);
+  if (occlusion_) occlusion_->add_estimate(output, tf.transforms.front());
+}
+
+void ReplayRun::print(const std::vector<PipelineEvent>& events) {
   for (const PipelineEvent& event : events) {
+    if (events_.add(event.text) > kMostLines) continue;
     std::cerr << "[" << std::fixed << std::setprecision(3) << to_seconds(newest_) << "] " << event.text << '\n';
   }
 }
@@ -213,7 +226,7 @@ void ReplayRun::write_biases(const std::vector<BiasEstimate>& biases) {
 
 template <class M>
 void ReplayRun::write(const std::string& topic, Stamp stamp, const M& message) {
-  if (bag_.isOpen()) bag_.write("/" + topic, std::max(to_ros(stamp), ros::TIME_MIN), message);
+  if (bag_) bag_->write("/" + topic, std::max(to_ros(stamp), ros::TIME_MIN), message);
 }
 
 }  // namespace urban_gnss

@@ -79,6 +79,14 @@ void assign_without_odometry(const LocalizerNodeSettings& localizer, YAML::Node&
   }
 }
 
+/// Where the parameters come from, for people.
+std::string sources_of(const ReplayOptions& options) {
+  std::string sources;
+  for (const std::string& file : options.params) sources += (sources.empty() ? "" : ", ") + file;
+  if (!options.overrides.empty()) sources += sources.empty() ? "--set" : ", --set";
+  return sources.empty() ? "replay" : sources;
+}
+
 /// The seed of the localizer's random numbers; nothing where it draws none.
 std::optional<ListedParameter> find_seed(const LocalizerNodeSettings& localizer) {
   const std::vector<ListedParameter> all = ParameterList().add(localizer).parameters();
@@ -120,7 +128,7 @@ ReplaySettings read_settings(const ReplayOptions& options, const LocalizerRegist
     const auto of_occlusion = read_tiered(maps.of_occlusion, std::string(kOcclusion) + ".", *settings.occlusion);
     faults.insert(faults.end(), of_occlusion.begin(), of_occlusion.end());
   }
-  if (!faults.empty()) throw ParameterError("replay", faults);
+  if (!faults.empty()) throw ParameterError(sources_of(options), faults);
   if (seed) settings.seed = std::stoi(find_seed(settings.localizer)->value);
   return settings;
 }
