@@ -105,8 +105,7 @@ def compare(options):
     if options.docs:
         recordings.write_docs(options.docs, "starts", recordings.markdown(HEADER, rows))
     path = os.path.join(options.output, "starts.json")
-    with open(path, "w", encoding="utf-8") as stream:
-        json.dump(results, stream, indent=1)
+    common.write_text(path, json.dumps(results, indent=1))
     return path
 
 

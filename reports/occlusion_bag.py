@@ -33,8 +33,8 @@ class Recording:
         self.path = path
         try:
             self.bag = rosbag.Bag(path)
-        except (OSError, rosbag.ROSBagException) as error:
-            raise common.ReportError("{}: {}".format(path, error))
+        except Exception as error:  # rosbag lets those of struct and others through where a file is damaged
+            raise common.ReportError("{}: cannot be read as a bag: {}".format(path, error))
         self.topics = sorted(self.bag.get_type_and_topic_info().topics)
 
     def messages(self, name):
@@ -239,8 +239,9 @@ def satellite_metrics(run, lines_of_sight):
 
 def write_rows(path, header, rows):
     """A CSV file of numbers."""
-    np.savetxt(path, np.asarray(rows, dtype=float).reshape(-1, len(header)), fmt="%.6g", delimiter=",",
-               header=",".join(header), comments="")
+    values = np.asarray(rows, dtype=float).reshape(-1, len(header))
+    common.write_text(path, "\n".join([",".join(header)] + [",".join("%.6g" % cell for cell in row) for row in values])
+                      + "\n")
 
 
 def write_trajectory(path, trajectory, start):
@@ -340,8 +341,7 @@ def write_metrics(out, paths, datum, models, options):
         write_trajectory(os.path.join(data, "trajectory_{}_{}.csv".format(name, key)), trajectory, start)
     command = "rosrun urban_gnss_localization occlusion_report.py " + " ".join(sys.argv[1:])
     metrics = {"command": command, "bag": os.path.basename(options.bag), "scenarios": {name: content}}
-    with open(os.path.join(out, "metrics.json"), "w", encoding="utf-8") as stream:
-        json.dump(metrics, stream, indent=2)
+    common.write_text(os.path.join(out, "metrics.json"), json.dumps(metrics, indent=2))
 
 
 def prepare(out, models, options):

@@ -335,8 +335,7 @@ def make_report(out):
     page.image("fig6.png", "As figure 6: fixes that each model calls good (green) and bad (red).")
     page.image("fig7.png", "As figure 7: the UKF's trajectories with each model's covariances.")
     page.provenance(metrics, ("scenarios",))
-    with open(os.path.join(out, "tables.md"), "w", encoding="utf-8") as stream:
-        stream.write("\n".join(text))
+    common.write_text(os.path.join(out, "tables.md"), "\n".join(text))
     page.save(os.path.join(out, "report.html"))
     return os.path.join(out, "report.html")
 

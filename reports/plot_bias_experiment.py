@@ -150,8 +150,7 @@ def make_report(directory):
         draw(os.path.join(directory, "data", name), os.path.join(directory, "fig6_{}.png".format(name)),
              metrics["seeds"][0])
         parts.append("## {}\n\n{}\n".format(name, table_of(scenarios[name])))
-    with open(os.path.join(directory, "table.md"), "w", encoding="utf-8") as stream:
-        stream.write("\n".join(parts))
+    common.write_text(os.path.join(directory, "table.md"), "\n".join(parts))
     return "{}: fig6_*.png, table.md".format(directory)
 
 

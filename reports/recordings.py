@@ -118,7 +118,6 @@ def write_docs(path, name, content):
     try:
         with open(path, encoding="utf-8") as stream:
             text = replace_between(stream.read(), name, content, path)
-        with open(path, "w", encoding="utf-8") as stream:
-            stream.write(text)
     except OSError as error:
         raise common.ReportError("{}: {}".format(path, error.strerror))
+    common.write_text(path, text)

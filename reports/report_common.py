@@ -19,6 +19,8 @@ from matplotlib.colors import to_rgb  # noqa: E402
 from matplotlib.ticker import FuncFormatter  # noqa: E402
 import numpy as np  # noqa: E402
 
+from whole_file import NotWritten, whole_file, write_whole  # noqa: E402
+
 FIGURE_DPI = 110
 
 TRUTH_COLOUR = "#000000"
@@ -170,17 +172,22 @@ def lighter(colour):
 
 
 def save_figure(figure, path):
-    """Write the figure, under a temporary name first so that no half picture remains, and close it."""
-    partial = path + ".part"
+    """Write the figure, and close it."""
     try:
-        figure.savefig(partial, dpi=FIGURE_DPI, format="png", bbox_inches="tight", facecolor="white")
-        os.replace(partial, path)
-    except OSError as error:
-        raise ReportError("{}: {}".format(path, error.strerror))
+        with whole_file(path, mode="wb") as stream:
+            figure.savefig(stream, dpi=FIGURE_DPI, format="png", bbox_inches="tight", facecolor="white")
+    except NotWritten as error:
+        raise ReportError(str(error))
     finally:
         plt.close(figure)
-        if os.path.exists(partial):
-            os.remove(partial)
+
+
+def write_text(path, text):
+    """Write a text file."""
+    try:
+        write_whole(path, text)
+    except NotWritten as error:
+        raise ReportError(str(error))
 
 
 def legend_beside(axes, **options):
@@ -271,8 +278,4 @@ class HtmlPage:
         page = ['<!DOCTYPE html>', '<html lang="en">', '<head>', '<meta charset="utf-8">',
                 "<title>{}</title>".format(self._title), "<style>{}</style>".format(STYLE), "</head>",
                 "<body>"]
-        try:
-            with open(path, "w", encoding="utf-8") as stream:
-                stream.write("\n".join(page + self._parts + ["</body>", "</html>", ""]))
-        except OSError as error:
-            raise ReportError("{}: {}".format(path, error.strerror))
+        write_text(path, "\n".join(page + self._parts + ["</body>", "</html>", ""]))
