@@ -5,8 +5,8 @@ usage: damage_campaign.py [--cases 1300] [--seconds S] [--seed 1] [--only KIND] 
 
 Each case is one whole small input (a bag, a .pcd, a CSV, a scenario, …) with one kind of damage: bits turned over, cut
 off, words that are huge, numbers that are none, another file's bytes. The same seed gives the same files. A tool may do
-its work all the same, or refuse with a line that names the file. Everything else is a fault: a signal, a hang, a message
-without the file's name, a Python traceback, remains beside an output, a number that is not finite in its results, an
+its work all the same, or refuse with a line that names the file. Everything else is a fault: a signal, a hang, a
+message without the file's name, a Python traceback, remains beside an output, a number that is not finite in its results, an
 input that has changed. Exits with 1 where there was one; --keep has the files of these. With --seconds it ends early.
 
 The workspace must be sourced; URBAN_GNSS_PROGRAMS may be the folder of the built programs.
@@ -60,7 +60,8 @@ def cut_out(numbers, data):
 
 def repeat(numbers, data):
     begin = numbers.randrange(len(data))
-    return data[:begin] + data[begin:begin + numbers.choice((1, 8, 100, 5000))] * numbers.choice((2, 2, 50)) + data[begin:]
+    piece = data[begin:begin + numbers.choice((1, 8, 100, 5000))]
+    return data[:begin] + piece * numbers.choice((2, 2, 50)) + data[begin:]
 
 
 def overwrite(numbers, data):
@@ -254,6 +255,11 @@ def run(count, seed, seconds=None, only="", keep=None, jobs=2, report=print):
     return table, faults
 
 
+def row_of(kind, counts, verdicts):
+    """A line of the table."""
+    return "| %s | %d | " % (kind, sum(counts.values())) + " | ".join(str(counts[v]) for v in verdicts) + " |"
+
+
 def show(table):
     """The table as lines of text."""
     verdicts = sorted({verdict for counts in table.values() for verdict in counts})
@@ -261,8 +267,8 @@ def show(table):
     total = collections.Counter()
     for kind, counts in table.items():
         total.update(counts)
-        lines.append("| %s | %d | " % (kind, sum(counts.values())) + " | ".join(str(counts[v]) for v in verdicts) + " |")
-    lines.append("| all | %d | " % sum(total.values()) + " | ".join(str(total[v]) for v in verdicts) + " |")
+        lines.append(row_of(kind, counts, verdicts))
+    lines.append(row_of("all", total, verdicts))
     return "\n".join(lines)
 
 

@@ -221,8 +221,8 @@ def write_all(folder):
         Case("meta.json", "meta.json", ["csv_to_bag", "{}", "OUT/o.bag"])]
     cases += [Case("csv " + name, name + ".csv", ["csv_to_bag", "{}", "OUT/o.bag"])
               for name in ("odom", "gnss", "sats", "imu", "truth")]
-    cases += [Case("pcd " + name, "wall_%s.pcd" % name, ["check_visibility", "--map", "{}/wall_%s.pcd" % name, "--table",
-                                                         "{}/table.csv", "--json", "OUT/o.json"])
+    cases += [Case("pcd " + name, "wall_%s.pcd" % name, [
+        "check_visibility", "--map", "{}/wall_%s.pcd" % name, "--table", "{}/table.csv", "--json", "OUT/o.json"])
               for name in ("ascii", "binary", "binary_compressed")]
     cases.append(Case("csv of visibility", "table.csv", ["check_visibility", "--map", "{}/wall_binary.pcd", "--table",
                                                          "{}/table.csv", "--json", "OUT/o.json"]))

@@ -3,8 +3,9 @@
 
 Looks through the whole tree for what others ship: #include, Python imports, nodes and $(find ...) of launch files,
 message types, what CMake finds, and programs that shell scripts and Python's subprocess call. Each is to belong to a
-package in scripts/apt-debian.txt, and what is used by more than tests to one that package.xml has not for tests only. That file is a table: Debian's package, its counterpart on Ubuntu with Noetic, and the key in
-package.xml, with which it is compared too. On a system that is no Debian, only the table is checked.
+package in scripts/apt-debian.txt, and what is used by more than tests to one that package.xml has not for tests only. That
+file is a table: Debian's package, its counterpart on Ubuntu with Noetic, and the key in package.xml, with which it is
+compared too. On a system that is no Debian, only the table is checked.
 
 Needs no declaration: the standard libraries of C, C++ and Python, the packages that every Debian has (dpkg's
 "required"), and a program that its script tells the reader to install, with the words `apt-get install PACKAGE`.
@@ -28,8 +29,8 @@ TABLE = os.path.join("scripts", "apt-debian.txt")
 LEFT_OUT = {".git", ".workspace", "results", "__pycache__"}
 PYTHON = "/usr/bin/python3"  # Debian's, whichever runs this
 
-# Of kind include, import, node (PACKAGE/TYPE), package, message (PACKAGE/TYPE), cmake or program. One that is not `certain`,
-# for it may be an argument, counts where something of its name is installed.
+# Of kind include, import, node (PACKAGE/TYPE), package, message (PACKAGE/TYPE), cmake or program. One that is not
+# `certain`, for it may be an argument, counts where something of its name is installed.
 Use = namedtuple("Use", "kind name file line certain")
 Row = namedtuple("Row", "debian noetic key line")
 

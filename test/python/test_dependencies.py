@@ -41,7 +41,8 @@ SHIPPED = {
     "good.h": "libgood-dev", "bad/bad.h": "libbad-dev", "vector": "libc6-dev",
     "fine_msgs.msg.Fine": "python3-fine-msgs", "bad_msgs.msg.Bad": "python3-bad-msgs", "bad_nodes/play": "bad-nodes",
     "bad_nodes": "bad-nodes",
-    "bad_msgs/Bad": "ros-bad-msgs", "bad_msgs": "libbad-msgs-dev", "Good": "libgood-dev", "catkin": "libgood-dev", "badtool": "bad-tools", "g++": "g++", "rosrun": "bad-rosbash", "sed": "required",
+    "bad_msgs/Bad": "ros-bad-msgs", "bad_msgs": "libbad-msgs-dev", "Good": "libgood-dev", "catkin": "libgood-dev",
+    "badtool": "bad-tools", "g++": "g++", "rosrun": "bad-rosbash", "sed": "required",
     "bash": "required", "timeout": "required", "python3": "required", "sys": "required", "subprocess": "required",
 }
 
@@ -113,7 +114,8 @@ class TreeTest(unittest.TestCase):
 
     def test_what_cmake_finds(self):
         text = "set(more bad_msgs)  # a list\nfind_package(Good)\nfind_package(catkin REQUIRED COMPONENTS ${more})\n"
-        self.expect(self.check(CMakeLists__txt=text), "room/CMakeLists.txt:3: cmake bad_msgs is shipped by libbad-msgs-dev")
+        self.expect(self.check(CMakeLists__txt=text), 
+                    "room/CMakeLists.txt:3: cmake bad_msgs is shipped by libbad-msgs-dev")
         self.expect(self.check(CMakeLists__txt="generate_messages(DEPENDENCIES bad_msgs)\n"),
                     "room/CMakeLists.txt:1: cmake bad_msgs")
 

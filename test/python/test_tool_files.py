@@ -109,8 +109,9 @@ class InputsTest(FilesTest):
             self.expect_kept(bag, "replay", name, "--json", bag)
 
     def test_two_outputs(self):
-        self.expect_refusal("another option writes this file", "replay", "drive_none.bag", "--json", "x", "--tum", "./x")
-        self.expect_refusal("another option writes this file", "doctor", "drive_none.bag", "--json", "x", "--html", "./x")
+        text = "another option writes this file"
+        self.expect_refusal(text, "replay", "drive_none.bag", "--json", "x", "--tum", "./x")
+        self.expect_refusal(text, "doctor", "drive_none.bag", "--json", "x", "--html", "./x")
 
     def test_csv_to_bag(self):
         for name in ("odom.csv", "gnss.csv", "meta.json", "imu.csv"):
@@ -137,12 +138,14 @@ class InputsTest(FilesTest):
 
     def test_check_visibility(self):
         for name in ("wall_ascii.pcd", "table.csv"):
-            self.expect_kept(name, "check_visibility", "--map", "wall_ascii.pcd", "--table", "table.csv", "--json", name)
+            self.expect_kept(name, "check_visibility", "--map", "wall_ascii.pcd", "--table", "table.csv", "--json",
+                             name)
 
     def test_doctor(self):
         for option in ("--json", "--html"):
             self.expect_kept("drive_none.bag", "doctor", "drive_none.bag", option, "drive_none.bag")
-            self.expect_kept("params.yaml", "doctor", "drive_none.bag", "--params", "params.yaml", option, "params.yaml")
+            self.expect_kept("params.yaml", "doctor", "drive_none.bag", "--params", "params.yaml", option,
+                             "params.yaml")
 
     def test_a_link_to_another_file_is_followed(self):
         os.symlink("target.tum", self.path("link.tum"))
@@ -201,10 +204,11 @@ class WholeTest(FilesTest):
             for topic, message, stamp in whole.read_messages("/odom"):
                 if stamp.to_sec() < damage_inputs.T0 + 12.0:
                     half.write(topic, message, stamp)
-        text = self.succeed("evaluate", "half.bag", "--truth", "drive_none.bag", "--estimate-topic", "/odom", "--output",
-                            "report", "--no-plots")
+        text = self.succeed("evaluate", "half.bag", "--truth", "drive_none.bag", "--estimate-topic", "/odom",
+                            "--output", "report", "--no-plots")
         self.assertIn("ends 13.0 s before the truth, which has 24.9 s", text)
-        text = self.succeed("evaluate", "drive_none.bag", "--estimate-topic", "/odom", "--output", "report", "--no-plots")
+        text = self.succeed("evaluate", "drive_none.bag", "--estimate-topic", "/odom", "--output", "report",
+                            "--no-plots")
         self.assertNotIn("before the truth", text)
 
     def test_what_cannot_be_written(self):
@@ -254,7 +258,8 @@ class BagTest(FilesTest):
     def test_every_length_in_the_bag(self):
         """Each word that may be a length or a place is made huge."""
         data = content(self.path("drive_bz2.bag"))
-        places = [k for k in range(0, len(data) - 4) if data[k + 2:k + 4] == b"\x00\x00" and data[k:k + 2] != b"\x00\x00"]
+        places = [k for k in range(0, len(data) - 4)
+                  if data[k + 2:k + 4] == b"\x00\x00" and data[k:k + 2] != b"\x00\x00"]
         for k in places[::max(1, len(places) // 60)]:
             for word in (b"\xff\xff\xff\xff", b"\xff\xff\xff\x7f"):
                 self.write("damaged.bag", data[:k] + word + data[k + 4:])
@@ -296,7 +301,7 @@ class MemoryTest(FilesTest):
     def write_long(self, name, laps):
         """Odometry and fixes without end, and no truth."""
         with rosbag.Bag(self.path("drive_none.bag")) as bag, rosbag.Bag(self.path(name), "w") as long:
-            messages = [(topic, message, stamp) for topic, message, stamp in bag.read_messages() if "truth" not in topic]
+            messages = [entry for entry in bag.read_messages() if "truth" not in entry[0]]
             for lap in range(laps):
                 shift = rospy.Duration(lap * damage_inputs.SECONDS)
                 for topic, message, stamp in messages:
