@@ -15,11 +15,11 @@ namespace urban_gnss {
 /// How a receiver's declared covariance is related to the errors of its fixes.
 struct FixNoiseModelParameters {
   double fix_scale_rate{0.03};
-  double first_fix_scale{2.5};
+  double first_fix_scale{2.0};
   double fix_covariance_weight{0.5};
   double fix_scale_limit{15.0};
   ErrorCorrelation errors{kFixErrors};
-  double fix_scale_lag{4.0};
+  double fix_scale_lag{15.0};
   double fix_scale_distance{30.0};
 
   void visit(ParameterVisitor& v) {

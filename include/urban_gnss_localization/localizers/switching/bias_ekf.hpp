@@ -24,10 +24,19 @@ namespace urban_gnss {
 /// learn it cover a part of the odometry's drift, too.
 inline constexpr CommonErrorParameters kCommonErrorBesideLearntOdometry{0.55, 0.15, 4.0};
 
+/// The noise of fixes where biases are modelled beside it: these take up what lasts, so that fixes are compared over
+/// less than the time for which a receiver smooths them.
+inline FixNoiseModelParameters fix_noise_beside_biases() {
+  FixNoiseModelParameters noise;
+  noise.first_fix_scale = 2.5;
+  noise.fix_scale_lag = 4.0;
+  return noise;
+}
+
 /// The model of odometry and receiver that the filters of the switching bias share.
 struct SwitchingModelParameters {
   FixSigmaParameters fix;
-  FixNoiseModelParameters noise;
+  FixNoiseModelParameters noise{fix_noise_beside_biases()};
   RangeFixParameters ranges;
   VelocityNoiseParameters velocity;
   BiasModeParameters modes;
