@@ -1,6 +1,7 @@
 #include "urban_gnss_localization/experiments/city_drive.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <deque>
 #include <utility>
 
@@ -43,7 +44,10 @@ class Dispatcher {
     for (DriveParticipant* each : participants_) each->add_odometry({stamp_, odometry.pose, odometry.twist});
   }
   void add(const ImuMessage& imu) {
-    for (DriveParticipant* each : participants_) each->add_imu_yaw_rate(stamp_, imu.angular_velocity_radps.z());
+    for (DriveParticipant* each : participants_) {
+      each->add_imu_yaw_rate(stamp_, imu.angular_velocity_radps.z());
+      if (imu.yaw_rad) each->add_imu_heading({stamp_, *imu.yaw_rad, std::sqrt(imu.yaw_variance)});
+    }
   }
   void add(const LidarScan& scan) {
     if (scans_++ % cloud_every_ == 0) clouds_.emplace_back(stamp_, to_point_cloud(scan));

@@ -46,6 +46,11 @@ class Participant : public LocalizingParticipant {
     localization_.add_imu_yaw_rate(stamp, yaw_rate_radps);
   }
 
+  void add_imu_heading(const HeadingSample& heading) override {
+    localization_.add_imu_heading(heading);
+    if (occlusion_) occlusion_->add_imu_heading(heading);
+  }
+
   void add_odometry(const OdometrySample& sample) override {
     localization_.add_odometry(sample);
     settle();

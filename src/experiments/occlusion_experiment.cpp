@@ -41,6 +41,10 @@ class Contestant {
     for (const auto& filter : filters_) filter->add_imu_yaw_rate(stamp, yaw_rate_radps);
   }
 
+  void add_heading(const HeadingSample& heading) {
+    for (const auto& filter : filters_) filter->add_imu_heading(heading);
+  }
+
   /// A fix of an epoch, and its satellites as the map sees them.
   void add_fix(const DriveEpoch& epoch, const std::vector<SatelliteObservation>& satellites, bool has_map) {
     const Eigen::Matrix2d claimed = epoch.fix->covariance.topLeftCorner<2, 2>();
@@ -118,6 +122,11 @@ class Setting : public DriveParticipant {
 
   void add_imu_yaw_rate(Stamp stamp, double yaw_rate_radps) override {
     for (const auto& contestant : contestants_) contestant->add_yaw_rate(stamp, yaw_rate_radps);
+  }
+
+  void add_imu_heading(const HeadingSample& heading) override {
+    occlusion_.add_imu_heading(heading);
+    for (const auto& contestant : contestants_) contestant->add_heading(heading);
   }
 
   void add_odometry(const OdometrySample& sample) override {

@@ -16,6 +16,10 @@ bool is_usable(const VelocityMeasurement& velocity) {
          is_positive_definite<2>(velocity.covariance);
 }
 
+bool is_usable(const HeadingMeasurement& heading) {
+  return std::isfinite(heading.yaw_rad) && std::isfinite(heading.sigma_rad) && heading.sigma_rad > 0.0;
+}
+
 bool is_usable(const Twist2& twist, double duration_s) {
   return std::isfinite(twist.speed_mps) && std::isfinite(twist.yaw_rate_radps) && std::isfinite(twist.lateral_mps) &&
          std::isfinite(duration_s) && duration_s > 0.0;

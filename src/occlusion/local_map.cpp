@@ -1,5 +1,9 @@
 #include "urban_gnss_localization/occlusion/local_map.hpp"
 
+#include <cmath>
+
+#include "urban_gnss_localization/geometry/angles.hpp"
+
 namespace urban_gnss {
 
 void LocalMapParameters::check(std::vector<std::string>& faults) const {
@@ -17,10 +21,11 @@ void LocalMap::clear() {
   map_.clear();
   correction_.setIdentity();
   has_keyframe_ = false;
+  odometry_from_bearing_rad_.reset();
 }
 
 ScanReport LocalMap::add_scan(const PointCloud& scan, const Eigen::Isometry3d& sensor_in_base,
-                              const Eigen::Isometry3d& base_in_map) {
+                              const Eigen::Isometry3d& base_in_map, std::optional<double> bearing_rad) {
   ScanReport report;
   report.points = scan.size();
   if (!sensor_in_base.matrix().allFinite() || !base_in_map.matrix().allFinite()) {
@@ -29,6 +34,7 @@ ScanReport LocalMap::add_scan(const PointCloud& scan, const Eigen::Isometry3d& s
     return report;
   }
   const PointCloud kept = cut(scan, sensor_in_base, report);
+  follow(bearing_rad, base_in_map);
   const Eigen::Isometry3d guess = correction_ * base_in_map;
   Eigen::Isometry3d sensor_in_map = guess * sensor_in_base;
   report.is_keyframe = is_keyframe(base_in_map);
@@ -48,6 +54,21 @@ ScanReport LocalMap::add_scan(const PointCloud& scan, const Eigen::Isometry3d& s
   report.base_in_map = sensor_in_map * sensor_in_base.inverse();
   report.insertion = map_.add_scan(transformed(kept, sensor_in_map), sensor_in_map.translation());
   return report;
+}
+
+void LocalMap::follow(std::optional<double> bearing_rad, const Eigen::Isometry3d& base_in_map) {
+  if (!bearing_rad) {
+    odometry_from_bearing_rad_.reset();
+    return;
+  }
+  const Eigen::Vector3d forward = base_in_map.linear().col(0);
+  const double difference_rad = wrap_angle(std::atan2(forward.y(), forward.x()) - *bearing_rad);
+  const double before_rad = odometry_from_bearing_rad_.value_or(difference_rad);
+  odometry_from_bearing_rad_ = difference_rad;
+  const double excess_rad = angle_difference(before_rad, difference_rad);
+  if (std::abs(excess_rad) > aligner_parameters_.max_correction_angle) return;
+  const Eigen::Translation3d place((correction_ * base_in_map).translation());
+  correction_ = place * Eigen::AngleAxisd(excess_rad, Eigen::Vector3d::UnitZ()) * place.inverse() * correction_;
 }
 
 PointCloud LocalMap::cut(const PointCloud& scan, const Eigen::Isometry3d& sensor_in_base, ScanReport& report) const {

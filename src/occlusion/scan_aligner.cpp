@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "pcl_cloud.hpp"
+#include "pcl_icp.hpp"
 
 namespace urban_gnss {
 namespace {
@@ -121,6 +122,16 @@ Eigen::Isometry3d moved_by(const Vector6& step, const Eigen::Isometry3d& pose, c
   return change * pose;
 }
 
+/// The guess, moved as far as `pose` along x and y, and turned as far about z.
+Eigen::Isometry3d planar_part(const Eigen::Isometry3d& pose, const Eigen::Isometry3d& guess) {
+  const Eigen::Matrix3d turned = pose.linear() * guess.linear().transpose();
+  const double yaw = std::atan2(turned(1, 0) - turned(0, 1), turned(0, 0) + turned(1, 1));
+  Eigen::Isometry3d planar = guess;
+  planar.linear() = Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()) * guess.linear();
+  planar.translation().head<2>() = pose.translation().head<2>();
+  return planar;
+}
+
 /// Least share of the constraint in any direction along the axes.
 double conditioning_of(const Constraints& constraints, const std::vector<int>& axes) {
   const Eigen::MatrixXd information = selected(constraints.information, axes);
@@ -165,6 +176,10 @@ Alignment judged(Alignment alignment, const Eigen::Isometry3d& guess, const Scan
 }
 
 }  // namespace
+
+EnumNames<AlignmentMethod> enum_names(AlignmentMethod) {
+  return {{"robust", AlignmentMethod::kRobust}, {"pcl_icp", AlignmentMethod::kPclIcp}};
+}
 
 EnumNames<AlignmentFreedom> enum_names(AlignmentFreedom) {
   return {{"planar", AlignmentFreedom::kPlanar}, {"full", AlignmentFreedom::kFull}};
@@ -255,6 +270,34 @@ struct ScanAligner::Target {
     }
     return sum;
   }
+
+  /// Gauss and Newton with robust weights: sets pose and iterations.
+  void align_robustly(const Source& source, const ScanAlignerParameters& p, Planes& planes,
+                      Alignment& alignment) const {
+    const std::vector<int> axes = free_axes(p.freedom);
+    const Schedule schedule{p};
+    for (int i = 0; i < p.max_iterations; ++i) {
+      const Constraints sum = constrain(source, alignment.pose, schedule.tolerance(i), p, planes);
+      if (sum.matched < kMinPoints) break;
+      const Vector6 step = solve(sum, axes);
+      alignment.pose = moved_by(step, alignment.pose, source);
+      alignment.iterations = i + 1;
+      if (step.norm() < kConverged_m && schedule.progress(i) >= 0.5) break;
+    }
+  }
+
+  /// The same by PCL; leaves the pose as it is where that finds none.
+  void align_by_pcl(const Source& source, const ScanAlignerParameters& p, Planes& planes, Alignment& alignment) const {
+    std::vector<SurfacePoint> surface;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      if (!planes[i].is_known) planes[i] = fit(i, p.normal_neighbours);
+      if (planes[i].is_flat) surface.push_back({points[i].cast<double>(), planes[i].normal});
+    }
+    const auto found = pcl_icp(surface, source.points, alignment.pose, p.max_distance, p.max_iterations);
+    if (!found) return;
+    alignment.iterations = found->iterations;
+    alignment.pose = p.freedom == AlignmentFreedom::kFull ? found->pose : planar_part(found->pose, alignment.pose);
+  }
 };
 
 ScanAligner::ScanAligner(const PointCloud& map, const ScanAlignerParameters& parameters)
@@ -275,27 +318,22 @@ Alignment ScanAligner::align(const PointCloud& scan, const Eigen::Isometry3d& gu
     return refused(alignment, guess, AlignmentDecision::kTooFewPoints, static_cast<double>(fewest), "of", kMinPoints);
   }
   const Source source = source_of(thinned(std::move(points), static_cast<std::size_t>(p.max_points)));
-  const std::vector<int> axes = free_axes(p.freedom);
-  const Schedule schedule{p};
   Target::Planes planes(target_->points.size());
   alignment.pose = guess;
-  for (int i = 0; i < p.max_iterations; ++i) {
-    const Constraints sum = target_->constrain(source, alignment.pose, schedule.tolerance(i), p, planes);
-    if (sum.matched < kMinPoints) break;
-    const Vector6 step = solve(sum, axes);
-    alignment.pose = moved_by(step, alignment.pose, source);
-    alignment.iterations = i + 1;
-    if (step.norm() < kConverged_m && schedule.progress(i) >= 0.5) break;
+  if (p.alignment_method == AlignmentMethod::kPclIcp) {
+    target_->align_by_pcl(source, p, planes, alignment);
+  } else {
+    target_->align_robustly(source, p, planes, alignment);
   }
 
-  const Constraints last = target_->constrain(source, alignment.pose, schedule.final(), p, planes);
+  const Constraints last = target_->constrain(source, alignment.pose, Schedule{p}.final(), p, planes);
   alignment.overlap = static_cast<double>(last.matched) / static_cast<double>(source.points.size());
   if (alignment.overlap < p.min_overlap) {
     return refused(alignment, guess, AlignmentDecision::kNoOverlap, alignment.overlap, "<", p.min_overlap);
   }
   alignment.inlier_fraction = static_cast<double>(last.inliers) / static_cast<double>(last.matched);
   if (last.inliers > 0) alignment.residual_m = std::sqrt(last.squared_residuals / static_cast<double>(last.inliers));
-  alignment.conditioning = conditioning_of(last, axes);
+  alignment.conditioning = conditioning_of(last, free_axes(p.freedom));
   alignment.correction_m = Eigen::Vector3d(alignment.pose * source.middle - guess * source.middle).norm();
   alignment.correction_rad = Eigen::AngleAxisd(alignment.pose.linear() * guess.linear().transpose()).angle();
   return judged(alignment, guess, p);

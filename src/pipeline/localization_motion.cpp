@@ -47,6 +47,7 @@ void LocalizationPipeline::add_odometry(const OdometrySample& message) {
     localizer_->move(twist, elapsed_s);
     const MotionDoubt doubt{speed_.doubt_m2(), yaw_rate_.doubt_rad2()};
     if (doubt.exists()) doubt_motion(doubt);
+    correct_heading();
     guard_against_non_finite();
   }
   if (!initialized() && start_.given() && frame()) start_from(told(*start_.given(), "the given pose"));
@@ -90,7 +91,30 @@ void LocalizationPipeline::forget_odometry(double gap_s) {
 }
 
 void LocalizationPipeline::add_imu(const ImuSample& sample) {
-  if (sample.rate_radps.allFinite()) add_imu_rate(imu_.yaw_rate(sample));
+  if (!sample.rate_radps.allFinite()) return;
+  add_imu_rate(imu_.yaw_rate(sample));
+  if (const auto heading = imu_.heading(sample)) add_imu_heading(*heading);
+}
+
+void LocalizationPipeline::add_imu_heading(const HeadingSample& heading) {
+  if (localizer_->takes_heading() && !is_far_ahead(heading.stamp)) heading_.add(heading);
+}
+
+void LocalizationPipeline::correct_heading() {
+  const Stamp lead = from_seconds(yaw_rate_.lead_s());
+  const auto told = heading_.take_due(history_.latest() + lead);
+  if (!told) return;
+  const auto since = history_.motion_between(told->stamp - lead, history_.latest());
+  if (since) localizer_->correct_heading({wrap_angle(told->yaw_rad + since->yaw), told->sigma_rad});
+}
+
+void LocalizationPipeline::compare_heading() {
+  const auto stamp = start_.remembered();
+  const Stamp lead = from_seconds(yaw_rate_.lead_s());
+  if (!stamp || !heading_.wants_comparison(*stamp + lead)) return;
+  const auto by_motion = start_.by_motion();
+  if (!by_motion) return;
+  heading_.compare(*stamp + lead, by_motion->pose.yaw, std::sqrt(by_motion->covariance(2, 2)), events_);
 }
 
 void LocalizationPipeline::add_imu_yaw_rate(Stamp stamp, double yaw_rate_radps) {

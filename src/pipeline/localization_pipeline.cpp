@@ -25,6 +25,7 @@ LocalizationPipeline::LocalizationPipeline(const LocalizationParameters& paramet
       datum_(parameters.datum),
       history_(kHistory_s),
       yaw_rate_(parameters.imu, parameters.input.stamps.odometry_gap),
+      heading_(parameters.imu_orientation),
       speed_(parameters.speed),
       velocities_(parameters.velocity),
       fixes_(parameters.input.fix_validation),
@@ -48,6 +49,7 @@ void LocalizationPipeline::reset(const std::string& why) {
   odometry_.reset();
   imu_.reset();
   yaw_rate_.reset();
+  heading_.reset();
   speed_.reset();
   velocities_.reset();
   fixes_.reset();
@@ -171,7 +173,9 @@ bool LocalizationPipeline::process_next_fix() {
     return true;
   }
   const std::optional<BiasEstimate> bias = take_bias(fix.fix.stamp);
-  if (restart_with(fix)) return true;
+  const bool restarts = restart_with(fix);
+  compare_heading();
+  if (restarts) return true;
   if (bias && is_rejected(bias->outcome.decision)) {
     decide(bias->outcome);
   } else {

@@ -10,6 +10,14 @@
 namespace urban_gnss {
 namespace {
 
+/// Standard deviation of a heading from which the IMU's may be learnt.
+constexpr double kComparable_rad = 0.2;
+
+double yaw_of(const Eigen::Isometry3d& base) {
+  const Eigen::Vector3d forward = base.linear().col(0);
+  return std::atan2(forward.y(), forward.x());
+}
+
 void append(std::string& text, const std::string& more) { text += (text.empty() ? "" : ", ") + more; }
 
 }  // namespace
@@ -53,7 +61,8 @@ OcclusionPipeline::OcclusionPipeline(const OcclusionPipelineParameters& paramete
       covariance_(parameters_.covariance),
       consistency_(parameters_.consistency),
       antenna_in_base_(parameters_.occlusion.antenna_offset[0], parameters_.occlusion.antenna_offset[1],
-                       parameters_.occlusion.antenna_offset[2]) {}
+                       parameters_.occlusion.antenna_offset[2]),
+      heading_(parameters_.imu_orientation) {}
 
 CloudOutcome OcclusionPipeline::add_cloud(Stamp stamp, const PointCloud& cloud, const Eigen::Isometry3d& sensor_in_base,
                                           const Eigen::Isometry3d& base_in_odom) {
@@ -66,7 +75,9 @@ CloudOutcome OcclusionPipeline::add_cloud(Stamp stamp, const PointCloud& cloud, 
     outcome.decision = CloudDecision::kNotFinite;
     return outcome;
   }
-  outcome.scan = local_map_.add_scan(cloud, sensor_in_base, base_in_odom);
+  const auto heading = heading_.told_at(stamp);
+  const std::optional<double> bearing_rad = heading ? std::optional<double>(heading->yaw_rad) : std::nullopt;
+  outcome.scan = local_map_.add_scan(cloud, sensor_in_base, base_in_odom, bearing_rad);
   kd_tracer_.reset();
   const ScanReport& scan = outcome.scan;
   const bool has_ground = scan.points > scan.not_finite + scan.own_body;
@@ -100,6 +111,10 @@ void OcclusionPipeline::set_satellites(Stamp stamp, std::vector<SatelliteObserva
   epochs_.add({stamp, std::move(satellites), resolution_rad});
 }
 
+void OcclusionPipeline::add_imu(const ImuSample& sample) {
+  if (const auto heading = imu_.heading(sample)) heading_.add(*heading);
+}
+
 const SatelliteEpoch* OcclusionPipeline::satellites_for(Stamp fix) const {
   const SatelliteEpoch* nearest = epochs_.nearest(fix, parameters_.occlusion.satellites_max_age);
   return nearest != nullptr && !nearest->satellites.empty() ? nearest : nullptr;
@@ -122,17 +137,37 @@ std::optional<AntennaPose> OcclusionPipeline::antenna_at(Stamp stamp,
   } else if (!has_prior_ && std::abs(to_seconds(stamp - *last_cloud_)) > p.map_timeout) {
     append(missing, "a recent cloud");
   }
-  if (!base_in_odom || !base_in_odom->matrix().allFinite()) append(missing, "the robot's pose in the odometry frame");
-  if (!alignment_ || std::abs(to_seconds(stamp - alignment_->stamp)) > p.heading_timeout) append(missing, "a heading");
+  const bool has_pose = base_in_odom && base_in_odom->matrix().allFinite();
+  if (!has_pose) append(missing, "the robot's pose in the odometry frame");
+  const auto alignment = alignment_at(stamp, has_pose ? base_in_odom : std::nullopt);
+  if (!alignment) append(missing, "a heading");
   if (!missing.empty()) return std::nullopt;
 
   AntennaPose antenna;
   antenna.position = local_map_.correction() * *base_in_odom * antenna_in_base_;
   antenna.position_sigma_m = p.antenna_sigma;
-  const Eigen::Vector3d corrected_x = local_map_.correction().linear() * Eigen::Vector3d::UnitX();
-  antenna.east_yaw_rad = wrap_angle(std::atan2(corrected_x.y(), corrected_x.x()) - alignment_->odom_in_world.yaw);
-  antenna.east_yaw_sigma_rad = std::max(p.heading_sigma, alignment_->yaw_sigma_rad);
+  antenna.east_yaw_rad = wrap_angle(yaw_of(local_map_.correction()) - alignment->odom_in_world.yaw);
+  antenna.east_yaw_sigma_rad = std::max(p.heading_sigma, alignment->yaw_sigma_rad);
   return antenna;
+}
+
+std::optional<WorldAlignment> OcclusionPipeline::alignment_at(
+    Stamp stamp, const std::optional<Eigen::Isometry3d>& base_in_odom) const {
+  std::optional<WorldAlignment> alignment = alignment_;
+  if (alignment && std::abs(to_seconds(stamp - alignment->stamp)) > parameters_.occlusion.heading_timeout) {
+    alignment.reset();
+  }
+  const auto heading = base_in_odom ? heading_.calibrated_at(stamp) : std::nullopt;
+  if (!heading || (alignment && alignment->yaw_sigma_rad <= heading->sigma_rad)) return alignment;
+  const double yaw_rad = angle_difference(heading->yaw_rad, yaw_of(*base_in_odom));
+  return WorldAlignment{stamp, {0.0, 0.0, yaw_rad}, heading->sigma_rad};
+}
+
+void OcclusionPipeline::compare_heading(Stamp stamp, const Eigen::Isometry3d& base_in_odom) {
+  if (!alignment_ || !heading_.wants_comparison(stamp) || alignment_->yaw_sigma_rad > kComparable_rad) return;
+  if (std::abs(to_seconds(stamp - alignment_->stamp)) > parameters_.occlusion.heading_timeout) return;
+  const double yaw_rad = wrap_angle(alignment_->odom_in_world.yaw + yaw_of(base_in_odom));
+  heading_.compare(stamp, yaw_rad, alignment_->yaw_sigma_rad, events_);
 }
 
 std::vector<double> OcclusionPipeline::skyline_at(const AntennaPose& antenna) const {
@@ -160,6 +195,7 @@ FixAssessment OcclusionPipeline::assess(Stamp stamp, const std::optional<Eigen::
   epochs_.take(stamp);
   const SatelliteEpoch* epoch = satellites_for(stamp);
   if (epoch != nullptr) assessment.satellites = epoch->satellites;
+  if (base_in_odom && base_in_odom->matrix().allFinite()) compare_heading(stamp, *base_in_odom);
   const auto antenna = antenna_at(stamp, base_in_odom, assessment.missing);
   if (epoch == nullptr) append(assessment.missing, "satellites");
   assessment.visibilities.resize(assessment.satellites.size());
@@ -198,6 +234,8 @@ void OcclusionPipeline::reset() {
   clear_map();
   covariance_.reset();
   alignment_.reset();
+  imu_.reset();
+  heading_.reset();
   epochs_.reset();
 }
 

@@ -12,6 +12,8 @@ using Level = PipelineEvent::Level;
 namespace {
 
 constexpr Stamp kSilence = std::chrono::seconds(10);
+/// Between two questions how the IMU is mounted.
+constexpr Stamp kMountingInterval = std::chrono::seconds(1);
 
 }  // namespace
 
@@ -47,6 +49,18 @@ void OcclusionQueue::add_cloud(QueuedCloud cloud) {
 
 void OcclusionQueue::add_satellites(const SatelliteEpoch& epoch) {
   pipeline_.set_satellites(epoch.stamp, epoch.satellites, epoch.angle_resolution_rad);
+}
+
+void OcclusionQueue::add_imu(const ImuSample& sample, const std::string& frame) {
+  const bool is_told = imu_mounting_known_ || frame.empty() || frame == frames_.base_link;
+  if (!is_told && sample.stamp >= next_mounting_) {
+    next_mounting_ = sample.stamp + kMountingInterval;
+    if (const auto mounting = transforms_.newest(frames_.base_link, frame)) {
+      pipeline_.set_imu_mounting(Eigen::Quaterniond(mounting->pose.linear()));
+      imu_mounting_known_ = true;
+    }
+  }
+  pipeline_.add_imu(sample);
 }
 
 void OcclusionQueue::add_fix(QueuedFix fix) {
@@ -97,7 +111,7 @@ void OcclusionQueue::start_anew() {
   clouds_.clear();
   fixes_.clear();
   transforms_.forget();
-  newest_ = Stamp(0);
+  newest_ = next_mounting_ = Stamp(0);
   yaw_sigma_ = 0.0;
 }
 
@@ -192,6 +206,7 @@ bool OcclusionQueue::assess(const QueuedFix& fix) {
   if (!is_finished_ && newest_ <= fix.stamp && pipeline_.awaits_satellites(fix.stamp)) return false;
   if (!antenna_known_) place_antenna(fix);
   const FixAssessment assessment = pipeline_.assess(fix.stamp, fix.claimed, base);
+  for (PipelineEvent& event : pipeline_.take_events()) events_.push_back(std::move(event));
   missing_ = assessment.missing;
   doubt_ = assessment.doubt;
   source_ = assessment.covariance.source;

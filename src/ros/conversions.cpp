@@ -137,8 +137,10 @@ std::optional<ImuSample> to_imu_sample(const sensor_msgs::Imu& message) {
   }
   const Eigen::Quaterniond orientation(message.orientation.w, message.orientation.x, message.orientation.y,
                                        message.orientation.z);
-  if (message.orientation_covariance[0] != -1.0 && std::abs(orientation.norm() - 1.0) < 0.1) {
+  if (message.orientation_covariance[0] >= 0.0 && std::abs(orientation.norm() - 1.0) < 0.1) {
     sample.orientation = orientation.normalized();
+    const double variance_rad2 = message.orientation_covariance[8];
+    if (std::isfinite(variance_rad2) && variance_rad2 > 0.0) sample.heading_sigma_rad = std::sqrt(variance_rad2);
   }
   return sample;
 }

@@ -44,7 +44,9 @@ LocalizerNode::LocalizerNode(ros::NodeHandle& node, ros::NodeHandle& private_nod
     subscribers_.push_back(node.subscribe(topics::kVelocity, 100, &Self::on_velocity, this, kNoDelay));
   }
   subscribers_.push_back(node.subscribe(topics::kSatellites, 100, &Self::on_satellites, this, kNoDelay));
-  if (parameters_.localization.imu.use_imu_yaw_rate) {
+  if (parameters_.localization.imu.use_imu_yaw_rate ||
+      (pipeline_.localizer().takes_heading() &&
+       parameters_.localization.imu_orientation.imu_heading != ImuHeadingUse::kNone)) {
     subscribers_.push_back(node.subscribe(topics::kImu, 1000, &Self::on_imu, this, kNoDelay));
   }
   services_.push_back(node.advertiseService("set_pose", &Self::set_pose, this));

@@ -46,6 +46,9 @@ OcclusionNode::OcclusionNode(ros::NodeHandle& node, ros::NodeHandle& private_nod
   // A longer queue than cloud_queue: what is dropped is dropped in on_cloud(), which counts it.
   cloud_subscriber_ = node.subscribe(topics::kPoints, 100, &OcclusionNode::on_cloud, this, no_delay);
   estimate_subscriber_ = node.subscribe(topics::kEstimate, 100, &OcclusionNode::on_estimate, this, no_delay);
+  if (settings.pipeline.imu_orientation.imu_heading != ImuHeadingUse::kNone) {
+    imu_subscriber_ = node.subscribe(topics::kImu, 1000, &OcclusionNode::on_imu, this, no_delay);
+  }
   clear_service_ = private_node.advertiseService("clear_map", &OcclusionNode::clear_map, this);
   save_service_ = private_node.advertiseService("save_map", &OcclusionNode::save_map, this);
 
@@ -75,6 +78,12 @@ void OcclusionNode::on_satellites(const urban_gnss_localization::SatelliteArray&
 
 void OcclusionNode::on_estimate(const nav_msgs::Odometry& message) {
   queue_->set_yaw_variance(message.pose.covariance[35]);
+}
+
+void OcclusionNode::on_imu(const sensor_msgs::Imu& message) {
+  if (const auto sample = to_imu_sample(message)) {
+    queue_->add_imu(*sample, without_leading_slash(message.header.frame_id));
+  }
 }
 
 void OcclusionNode::on_fix(const sensor_msgs::NavSatFixConstPtr& message) {

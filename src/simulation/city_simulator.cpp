@@ -9,7 +9,7 @@ namespace urban_gnss {
 namespace {
 
 /// Each sensor draws from a seed of its own, so that a change of one leaves the others' noise as it was.
-enum Stream : std::uint64_t { kVehicle = 201, kOdometry, kImu, kReceiver, kFaults, kLidar };
+enum Stream : std::uint64_t { kVehicle = 201, kOdometry, kImu, kReceiver, kFaults, kLidar, kCompass };
 
 std::uint64_t stream_seed(int seed, Stream stream) { return make_engine(static_cast<std::uint64_t>(seed), stream)(); }
 
@@ -54,6 +54,7 @@ CitySimulator::CitySimulator(Scenario scenario)
       odometry_(scenario_.odometry, scenario_.vehicle.drive, scenario_.vehicle.wheelbase,
                 stream_seed(scenario_.seed, kOdometry)),
       imu_(scenario_.imu, stream_seed(scenario_.seed, kImu)),
+      compass_(scenario_.compass, stream_seed(scenario_.seed, kCompass)),
       sky_(scenario_.sky, scenario_.datum, scenario_.start_time,
            std::filesystem::path(scenario_.file).parent_path().string()),
       tracer_(scenario_.world, index_, scenario_.signals),
@@ -86,7 +87,10 @@ void CitySimulator::step(const std::optional<Twist2>& command, std::vector<Simul
   if (antenna_history_.size() > 1 + steps_of(scenario_.receiver.fix_delay, interval_s_)) antenna_history_.pop_front();
 
   // Before the odometry, whose step it is a part of.
-  if (const auto imu = imu_.advance(vehicle_.twist().yaw_rate_radps, vehicle_.acceleration(), interval_s_)) add(*imu);
+  if (auto imu = imu_.advance(vehicle_.twist().yaw_rate_radps, vehicle_.acceleration(), interval_s_)) {
+    if (scenario_.compass.enabled) orient(*imu);
+    add(*imu);
+  }
   if (const auto odometry = odometry_.advance(vehicle_.twist(), interval_s_)) {
     add(TruthEvent{vehicle_.pose(), vehicle_.twist()});
     add(OdometryEvent{odometry->pose, odometry->twist, odometry->speed_variance, odometry->yaw_rate_variance});
@@ -104,6 +108,15 @@ void CitySimulator::step(const std::optional<Twist2>& command, std::vector<Simul
   const auto published = pending_.upper_bound(now_);
   for (auto event = pending_.begin(); event != published; ++event) events.push_back(std::move(event->second));
   pending_.erase(pending_.begin(), published);
+}
+
+void CitySimulator::orient(ImuMessage& imu) {
+  std::vector<Box> cars;
+  for (const Car& car : cars_) cars.push_back(car.at(elapsed_s()));
+  const Eigen::Vector2d field = steel_field(scenario_.compass, vehicle_.pose().position(), index_.walls(), cars);
+  imu.yaw_rad = compass_.measure(vehicle_.pose().yaw, field, elapsed_s() - compass_read_s_);
+  imu.yaw_variance = compass_.claimed_variance();
+  compass_read_s_ = elapsed_s();
 }
 
 void CitySimulator::receive(double interval_s) {

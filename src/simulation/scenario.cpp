@@ -86,6 +86,7 @@ class ScenarioReader {
     section("autopilot", scenario_.autopilot);
     section("odometry", scenario_.odometry);
     section("imu", scenario_.imu);
+    section("compass", scenario_.compass);
     section("sky", scenario_.sky);
     section("signals", scenario_.signals);
     section("receiver", scenario_.receiver);

@@ -72,8 +72,12 @@ sensor_msgs::Imu to_message(const ImuMessage& imu, const ros::Time& time, const 
   sensor_msgs::Imu message;
   message.header.stamp = time;
   message.header.frame_id = frame;
-  message.orientation.w = 1.0;
-  message.orientation_covariance[0] = -1.0;  // sensor_msgs/Imu: no orientation
+  message.orientation = to_message(Pose2{0.0, 0.0, imu.yaw_rad.value_or(0.0)}).orientation;
+  if (imu.yaw_rad) {
+    message.orientation_covariance[8] = imu.yaw_variance;  // roll and pitch are 0, exactly
+  } else {
+    message.orientation_covariance[0] = -1.0;  // sensor_msgs/Imu: no orientation
+  }
   message.angular_velocity = to_vector(imu.angular_velocity_radps);
   message.linear_acceleration = to_vector(imu.acceleration_mps2);
   for (const std::size_t axis : {0U, 4U, 8U}) {

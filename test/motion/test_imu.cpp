@@ -56,6 +56,31 @@ TEST(ImuLeveller, AnOrientationThatWasNeverFilledInDoesNotHideTheMounting) {
   EXPECT_NEAR(leveller.yaw_rate(sample).told_radps, 0.4, 1e-12);
 }
 
+TEST(ImuLeveller, HeadingIsThatOfTheBase) {
+  for (const Eigen::Quaterniond& mounting : kMountings) {
+    ImuLeveller leveller;
+    leveller.set_mounting(mounting);
+    for (const double heading : {0.3, 2.0, -3.0}) {
+      ImuSample sample;
+      sample.orientation = turned(0.0, 0.0, heading) * mounting;
+      sample.heading_sigma_rad = 0.1;
+      ASSERT_TRUE(leveller.heading(sample));
+      EXPECT_NEAR(angle_difference(leveller.heading(sample)->yaw_rad, heading), 0.0, 1e-9);
+      EXPECT_EQ(leveller.heading(sample)->sigma_rad, 0.1);
+    }
+  }
+}
+
+TEST(ImuLeveller, WithoutAnOrientationThereIsNoHeading) {
+  const ImuLeveller leveller;
+  ImuSample sample;
+  EXPECT_FALSE(leveller.heading(sample));
+  sample.orientation = Eigen::Quaterniond::Identity();
+  EXPECT_FALSE(leveller.heading(sample)) << "never filled in";
+  sample.orientation = turned(0.0, 0.5 * kPi, 0.0);
+  EXPECT_FALSE(leveller.heading(sample)) << "the base's x axis points down";
+}
+
 TEST(ImuLeveller, GravityTellsTheAxisThatIsUp) {
   RandomEngine engine = make_engine(1);
   for (const Eigen::Quaterniond& mounting : kMountings) {

@@ -73,6 +73,36 @@ TEST(ScanAligner, RecoversASmallMotion) {
   }
 }
 
+TEST(ScanAligner, PclFindsTheSamePose) {
+  const auto walls = street();
+  ScanAlignerParameters parameters;
+  parameters.alignment_method = AlignmentMethod::kPclIcp;
+  const Eigen::Isometry3d truth = pose(3.0, -1.0, 1.5, 0.4);
+  const PointCloud scan = scan_of(walls, truth, 1);
+  const Eigen::Isometry3d guess = pose(3.2, -1.1, 1.5, 0.42);
+  const Eigen::Translation3d far(2000.0, -3000.0, 10.0);  // where floats are coarse
+  for (const Eigen::Isometry3d& place : {Eigen::Isometry3d::Identity(), Eigen::Isometry3d(far)}) {
+    const ScanAligner aligner(transformed(voxel_filtered(sampled(walls, 0.3), 0.5), place), parameters);
+    const Alignment alignment = aligner.align(scan, place * guess);
+    ASSERT_TRUE(alignment.is_accepted()) << alignment.reason;
+    expect_near(alignment.pose, place * truth, 0.1, 0.01);
+    EXPECT_GT(alignment.iterations, 0);
+    const Eigen::Isometry3d change = alignment.pose * (place * guess).inverse();
+    EXPECT_NEAR((change.linear() * Eigen::Vector3d::UnitZ() - Eigen::Vector3d::UnitZ()).norm(), 0.0, 1e-9) << "planar";
+    EXPECT_NEAR(alignment.pose.translation().z(), (place * guess).translation().z(), 1e-9);
+  }
+}
+
+TEST(ScanAligner, WithPclTooABadFitIsRefused) {
+  ScanAlignerParameters parameters;
+  parameters.alignment_method = AlignmentMethod::kPclIcp;
+  const ScanAligner aligner(voxel_filtered(sampled(street(), 0.3), 0.5), parameters);
+  const Eigen::Isometry3d guess = pose(3.0, -1.0, 40.0, 0.4);  // above the roofs
+  const Alignment alignment = aligner.align(scan_of(street(), pose(3.0, -1.0, 1.5, 0.4), 1), guess);
+  EXPECT_FALSE(alignment.is_accepted());
+  EXPECT_TRUE(alignment.pose.isApprox(guess));
+}
+
 TEST(ScanAligner, FullFreedomRecoversRollPitchAndHeight) {
   auto walls = street();
   walls.push_back({{-80, -60, 0}, {160, 0, 0}, {0, 120, 0}});  // the ground
@@ -205,6 +235,55 @@ TEST(LocalMap, AlignmentTakesOutTheDriftOfTheOdometry) {
       EXPECT_FALSE(tracer.trace({0, 0, 1.5}, Eigen::Vector3d(0.0, 1.0, 8.0).normalized()).blocked);
     }
   }
+}
+
+/// A drive behind wheels that turn too far from one scan to the next, with a bearing that is off by a constant, and
+/// jumps in the middle.
+struct BearingDrive {
+  double excess_rad;
+  bool has_bearing;
+  double jump_rad;
+  double worst_turn_rad{0.0};        ///< of the map's pose, away from the truth
+  double worst_correction_rad{0.0};  ///< that an alignment had to find
+
+  BearingDrive(double excess, bool with_bearing, double jump)
+      : excess_rad(excess), has_bearing(with_bearing), jump_rad(jump) {
+    const auto walls = street();
+    LocalMap map({}, {}, {});
+    for (int i = 0; i <= 8; ++i) {
+      const Eigen::Isometry3d truth = pose(-6.0 + 1.5 * i, 0.0, 0.0, 0.02 * i);
+      const Eigen::Isometry3d odometry = pose(-6.0 + 1.5 * i, 0.0, 0.0, (0.02 + excess_rad) * i);
+      std::optional<double> bearing_rad;
+      if (has_bearing) bearing_rad = 0.02 * i + 1.2 + (i >= 4 ? jump_rad : 0.0);
+      const ScanReport report = map.add_scan(scan_of(walls, truth * kSensor, 70 + i), kSensor, odometry, bearing_rad);
+      const Eigen::Matrix3d turned = report.base_in_map.linear() * truth.linear().transpose();
+      worst_turn_rad = std::max(worst_turn_rad, Eigen::AngleAxisd(turned).angle());
+      worst_correction_rad = std::max(worst_correction_rad, report.alignment.correction_rad);
+    }
+  }
+};
+
+TEST(LocalMap, GuessTurnsWithTheBearing) {
+  LocalMapParameters blind;
+  blind.align = false;
+  LocalMap map(blind, {}, {});
+  map.add_scan({{10, 0, 1}}, kSensor, pose(1, 2, 0, 0.5), 2.0);
+  const Eigen::Isometry3d turned = map.add_scan({{10, 0, 1}}, kSensor, pose(1, 2, 0, 0.5), 2.1).base_in_map;
+  expect_near(turned, pose(1, 2, 0, 0.6), 1e-9, 1e-9);
+  const Eigen::Isometry3d without = map.add_scan({{10, 0, 1}}, kSensor, pose(1, 2, 0, 0.5)).base_in_map;
+  expect_near(without, pose(1, 2, 0, 0.6), 1e-9, 1e-9);  // what it has found stays
+}
+
+TEST(LocalMap, BearingGuidesTheAlignment) {
+  const BearingDrive guided(0.1, true, 0.0);
+  EXPECT_LT(guided.worst_turn_rad, 0.02);
+  EXPECT_LT(guided.worst_correction_rad, 0.02);
+  EXPECT_GT(BearingDrive(0.1, false, 0.0).worst_correction_rad, 0.08);
+}
+
+TEST(LocalMap, BearingThatJumpsIsNotFollowed) {
+  EXPECT_LT(BearingDrive(0.03, true, 1.5).worst_turn_rad, 0.02)
+      << "the odometry's turn is taken, and the alignment undoes it";
 }
 
 TEST(LocalMap, KeyframesAreAtDistancesAndTurns) {

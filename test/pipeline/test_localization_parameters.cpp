@@ -23,6 +23,7 @@ std::string trace(const std::string& base, const std::string& change, bool wants
   for (int k = 0; k <= 400; ++k) {
     const double time = 0.1 * k;
     rig.pipeline.add_imu_yaw_rate(Rig::at(time), 0.12);
+    rig.pipeline.add_imu_heading({Rig::at(time), Rig::truth(time).yaw + 0.01, 0.02});
     if (k > 200) {
       RawVelocity velocity = Rig::velocity(time);
       if (k % 2 == 0) velocity.covariance.setZero();
@@ -44,6 +45,8 @@ std::string trace(const std::string& base, const std::string& change, bool wants
   for (const FixMeasurement& fix : rig.fake->fixes) {
     out << fix.antenna_in_body.transpose() << ' ' << fix.covariance(0, 0) << ' ' << fix.position.transpose() << '\n';
   }
+  for (const HeadingMeasurement& heading : rig.fake->headings)
+    out << heading.yaw_rad << ' ' << heading.sigma_rad << '\n';
   for (const VelocityMeasurement& velocity : rig.fake->velocities) out << velocity.covariance(0, 0) << '\n';
   for (const PoseEstimate& start : rig.fake->starts) out << start.pose.x << ' ' << start.covariance << '\n';
   rig.run(0.0, 1.0);
@@ -84,6 +87,7 @@ std::string trace_of_faults(const std::string& changes) {
 TEST(LocalizationPipeline, EveryParameterHasAnEffect) {
   const std::string datum = "datum: [33.0, 130.0, 20.0]";
   const std::string given = kGiven;
+  const std::string absolute = "{datum: [33.0, 130.0, 20.0], initial_pose: [0.0, 0.0, 0.0], imu_heading: absolute}";
   const std::string far_off = "{datum: [33.0, 130.0, 20.0], initial_pose: [150.0, 0.0, 0.0]}";
   const std::map<std::string, std::pair<std::string, std::string>> changes = {
       {"initial_pose", {datum, "[0.0, 0.0, 0.5]"}},
@@ -91,6 +95,9 @@ TEST(LocalizationPipeline, EveryParameterHasAnEffect) {
       {"initial_heading_sigma", {given, "0.1"}},
       {"antenna_offset", {given, "[1.0, 0.0]"}},
       {"use_imu_yaw_rate", {given, "false"}},
+      {"imu_heading", {absolute, "none"}},
+      {"imu_heading_offset", {absolute, "0.1"}},
+      {"imu_heading_sigma", {absolute, "0.5"}},
       {"use_gps_velocity", {given, "false"}},
       {"velocity_sigma_default", {given, "0.5"}},
       {"velocity_sigma_floor", {given, "0.2"}},

@@ -116,6 +116,60 @@ TEST(OcclusionPipeline, AHeadingOffByHalfATurnShows) {
   EXPECT_EQ(blocked(fix, kAway), 1.0);
 }
 
+OcclusionPipelineParameters with_imu(ImuHeadingUse use, double sigma_rad = 0.02) {
+  OcclusionPipelineParameters p = parameters();
+  p.imu_orientation.imu_heading = use;
+  p.imu_orientation.imu_heading_sigma = sigma_rad;
+  return p;
+}
+
+TEST(OcclusionPipeline, ImuTurnsTheSkyWhereNobodyElseKnowsTheHeading) {
+  for (const double yaw : {0.0, 0.5, -2.0}) {
+    for (const ImuHeadingUse use : {ImuHeadingUse::kAbsolute, ImuHeadingUse::kLearnt, ImuHeadingUse::kNone}) {
+      OcclusionPipeline pipeline(with_imu(use));
+      const Eigen::Isometry3d base = at(30.0, -20.0, 0.0, -yaw);  // heading east
+      pipeline.add_imu_heading({kStart, 0.0, 0.0});
+      pipeline.add_cloud(kStart, scan(), kSensor, base);
+      pipeline.set_satellites(kStart, sky(), 0.0);
+      const FixAssessment fix = pipeline.assess(kStart, claim(), base);
+      EXPECT_EQ(fix.has_map, use == ImuHeadingUse::kAbsolute);
+      EXPECT_EQ(fix.missing, fix.has_map ? "" : "a heading");
+      if (!fix.has_map) continue;
+      EXPECT_EQ(blocked(fix, kBehind), 1.0) << yaw;
+      for (const std::size_t free : {kOverTheRoof, kAlong, kAway, kBackAlong})
+        EXPECT_EQ(blocked(fix, free), 0.0) << yaw;
+    }
+  }
+}
+
+TEST(OcclusionPipeline, TheSurerHeadingTurnsTheSky) {
+  for (const bool localizer_is_surer : {true, false}) {
+    OcclusionPipeline pipeline(with_imu(ImuHeadingUse::kAbsolute, 0.1));
+    pipeline.add_imu_heading({kStart, kPi, 0.0});  // half a turn off
+    feed(pipeline, {true, true, true, 0.0, localizer_is_surer ? 0.05 : 0.3});
+    EXPECT_NEAR(blocked(assess(pipeline), kBehind), localizer_is_surer ? 1.0 : 0.0, 0.01);
+  }
+}
+
+TEST(OcclusionPipeline, ImuLearnsItsOffsetFromTheLocalizer) {
+  OcclusionPipeline pipeline(with_imu(ImuHeadingUse::kLearnt));
+  Stamp stamp = kStart;
+  for (int k = 0; k < 5; ++k, stamp += from_seconds(20.0)) {
+    pipeline.add_imu_heading({stamp, 1.5, 0.0});
+    feed(pipeline, {}, sky(), stamp);
+    pipeline.assess(stamp, claim(), at(0, 0, 0));
+  }
+  ASSERT_EQ(pipeline.take_events().size(), 1u) << "that it is turned";
+  pipeline.add_imu_heading({stamp, 1.5, 0.0});
+  feed(pipeline, {true, false}, sky(), stamp);  // the localizer's heading is 20 s old
+  const FixAssessment fix = pipeline.assess(stamp, claim(), at(0, 0, 0));
+  EXPECT_TRUE(fix.has_map) << fix.missing;
+  EXPECT_EQ(blocked(fix, kBehind), 1.0);
+  pipeline.reset();
+  feed(pipeline, {true, false}, sky(), stamp);
+  EXPECT_FALSE(pipeline.assess(stamp, claim(), at(0, 0, 0)).has_map) << "a reset forgets it";
+}
+
 // The odometry's frame lies in any way to the world: the same robot in the same street gives the same.
 TEST(OcclusionPipeline, TheOdometrysFrameDoesNotMatter) {
   for (const double yaw : {0.5, 2.0, -1.5}) {

@@ -32,6 +32,7 @@ struct FakeLocalizer : Localizer {
   bool printed{false};  ///< is as its paper prints it
   bool takes{true};     ///< velocities
   std::vector<VelocityMeasurement> velocities;
+  std::vector<HeadingMeasurement> headings;
   bool takes_sky{true};  ///< satellites
 
   const char* name() const override { return "fake"; }
@@ -59,6 +60,8 @@ struct FakeLocalizer : Localizer {
   }
   bool takes_velocity() const override { return takes; }
   void correct_velocity(const VelocityMeasurement& velocity) override { velocities.push_back(velocity); }
+  bool takes_heading() const override { return true; }
+  void correct_heading(const HeadingMeasurement& heading) override { headings.push_back(heading); }
   bool takes_satellites() const override { return takes_sky; }
   Pose2 pose() const override { return state.pose; }
   PoseEstimate estimate() const override { return state; }

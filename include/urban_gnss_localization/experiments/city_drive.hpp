@@ -7,6 +7,7 @@
 
 #include "urban_gnss_localization/evaluation/trajectory.hpp"
 #include "urban_gnss_localization/gnss/gnss_covariance.hpp"
+#include "urban_gnss_localization/motion/imu_heading.hpp"
 #include "urban_gnss_localization/motion/odometry_history.hpp"
 #include "urban_gnss_localization/occlusion/point_cloud.hpp"
 #include "urban_gnss_localization/simulation/receiver.hpp"
@@ -30,6 +31,7 @@ class DriveParticipant {
   virtual ~DriveParticipant() = default;
   virtual bool wants_clouds() const = 0;
   virtual void add_imu_yaw_rate(Stamp, double /*radps*/) {}
+  virtual void add_imu_heading(const HeadingSample& /*heading*/) {}
   virtual void add_odometry(const OdometrySample& sample) = 0;
   /// A lidar's cloud (m, sensor frame), and where the base was in the odometry frame at its stamp.
   virtual void add_cloud(Stamp stamp, const PointCloud& cloud, const Eigen::Isometry3d& sensor_in_base,

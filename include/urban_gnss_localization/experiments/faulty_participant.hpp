@@ -28,6 +28,7 @@ class FaultyParticipant : public DriveParticipant {
 
   bool wants_clouds() const override { return told_.wants_clouds(); }
   void add_imu_yaw_rate(Stamp stamp, double yaw_rate_radps) override;
+  void add_imu_heading(const HeadingSample& heading) override { told_.add_imu_heading(heading); }
   void add_odometry(const OdometrySample& sample) override;
   void add_cloud(Stamp stamp, const PointCloud& cloud, const Eigen::Isometry3d& sensor_in_base,
                  const Pose2& base_in_odom) override;

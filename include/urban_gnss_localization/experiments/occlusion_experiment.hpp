@@ -22,6 +22,7 @@ struct OcclusionExperimentConditions {
     occlusion.covariance.allow_smaller = true;
     ukf.outliers = OutlierPolicy::kNone;
     localization.imu.use_imu_yaw_rate = true;
+    occlusion.imu_orientation.imu_heading = localization.imu_orientation.imu_heading = ImuHeadingUse::kNone;
   }
 
   OcclusionPipelineParameters occlusion;   ///< of our setting; model and antenna are replaced

@@ -36,10 +36,18 @@ struct VelocityMeasurement {
   double time_s{0.0};  ///< of the velocity, since any fixed instant
 };
 
+/// A heading that does not come from fixes, at the moment it enters a filter.
+struct HeadingMeasurement {
+  double yaw_rad{0.0};    ///< of the base now, in the map frame
+  double sigma_rad{0.0};  ///< of an error that may last: many of them are no better than one
+};
+
 /// Whether a filter can take the fix: all finite, with a positive definite covariance.
 bool is_usable(const FixMeasurement& fix);
 /// The same for a velocity.
 bool is_usable(const VelocityMeasurement& velocity);
+/// The same for a heading.
+bool is_usable(const HeadingMeasurement& heading);
 /// Whether a filter can move by the step: finite, for a positive time.
 bool is_usable(const Twist2& twist, double duration_s);
 
@@ -85,6 +93,11 @@ class Localizer {
   virtual bool takes_velocity() const { return false; }
   /// Takes one velocity of the receiver; methods that do not use velocities ignore it.
   virtual void correct_velocity(const VelocityMeasurement& /*velocity*/) {}
+
+  /// Whether it makes use of headings that do not come from fixes.
+  virtual bool takes_heading() const { return false; }
+  /// Takes a heading, as of a compass; methods that do not use headings ignore it.
+  virtual void correct_heading(const HeadingMeasurement& /*heading*/) {}
 
   /// Whether it makes use of the satellites of a fix.
   virtual bool takes_satellites() const { return false; }

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "urban_gnss_localization/common/stamp.hpp"
+#include "urban_gnss_localization/motion/imu_heading.hpp"
 
 namespace urban_gnss {
 
@@ -13,7 +14,9 @@ struct ImuSample {
   Stamp stamp{0};
   Eigen::Vector3d rate_radps{Eigen::Vector3d::Zero()};
   Eigen::Vector3d acceleration_mps2{Eigen::Vector3d::Zero()};  ///< specific force: up at rest; 0: not measured
-  std::optional<Eigen::Quaterniond> orientation{};             ///< of the IMU in a level frame, where it tells one
+  /// Of the IMU in a level frame, x east and y north by REP-103, where it tells one.
+  std::optional<Eigen::Quaterniond> orientation{};
+  double heading_sigma_rad{0.0};  ///< of the orientation about the vertical, as declared; 0: not declared
 };
 
 /// A yaw rate, counter-clockwise from above, by what is told of how the IMU is mounted, and by gravity.
@@ -35,6 +38,9 @@ class ImuLeveller {
 
   /// Requires finite numbers.
   ImuYawRate yaw_rate(const ImuSample& sample);
+  /// The base's heading by the IMU's orientation and mounting; without a mounting, the IMU's axes are the base's.
+  /// Nothing without an orientation, and where the base's x axis would point up or down.
+  std::optional<HeadingSample> heading(const ImuSample& sample) const;
   /// Forgets gravity, not the mounting.
   void reset() { gravity_.reset(); }
 

@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -50,6 +51,10 @@ struct ScanReport {
 /// Builds the map of the surroundings from scans (Maier & Kleiner 2010, section IV.A and eq. 5): cut, align at
 /// keyframes, insert. A correction that the alignment finds stays in force until the next one; if an alignment is not
 /// accepted, the scan is inserted with the guess and the last correction, and the report says so.
+///
+/// Where an IMU tells the bearing, the guess turns as the bearing does and not as the odometry (section V: "odometry
+/// and IMU bearing as an initial guess"). A constant error of the bearing has no effect. Where both turn so differently
+/// that an alignment could not undo it (max_correction_angle), the odometry's turn is taken.
 class LocalMap {
  public:
   /// Throws ParameterError.
@@ -57,9 +62,9 @@ class LocalMap {
            const ScanAlignerParameters& aligner_parameters);
 
   /// `scan` in m in the sensor's frame; `base_in_map` is the odometry's guess for the time of the scan. Nothing is
-  /// inserted where a transform is not finite.
+  /// inserted where a transform is not finite. `bearing_rad`: the IMU's, at that time.
   ScanReport add_scan(const PointCloud& scan, const Eigen::Isometry3d& sensor_in_base,
-                      const Eigen::Isometry3d& base_in_map);
+                      const Eigen::Isometry3d& base_in_map, std::optional<double> bearing_rad = std::nullopt);
 
   /// A prior map, in the map frame.
   InsertReport add_prior(const PointCloud& points) { return map_.add_points(points); }
@@ -67,12 +72,14 @@ class LocalMap {
   void clear();
 
   const VoxelMap& map() const { return map_; }
-  /// From the guess's map frame to the map's: identity until an alignment is accepted.
+  /// From the guess's map frame to the map's: identity until an alignment is accepted or a bearing turns the guess.
   const Eigen::Isometry3d& correction() const { return correction_; }
 
  private:
   PointCloud cut(const PointCloud& scan, const Eigen::Isometry3d& sensor_in_base, ScanReport& report) const;
   bool is_keyframe(const Eigen::Isometry3d& base_in_map) const;
+  /// Turns the correction by what the bearing has turned more than the odometry since the last scan.
+  void follow(std::optional<double> bearing_rad, const Eigen::Isometry3d& base_in_map);
 
   LocalMapParameters parameters_;
   ScanAlignerParameters aligner_parameters_;
@@ -80,6 +87,7 @@ class LocalMap {
   Eigen::Isometry3d correction_{Eigen::Isometry3d::Identity()};
   Eigen::Isometry3d last_keyframe_{Eigen::Isometry3d::Identity()};
   bool has_keyframe_{false};
+  std::optional<double> odometry_from_bearing_rad_;  ///< the odometry's yaw minus the bearing, at the last scan
 };
 
 }  // namespace urban_gnss

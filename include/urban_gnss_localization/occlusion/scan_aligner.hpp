@@ -19,7 +19,14 @@ enum class AlignmentFreedom {
 };
 EnumNames<AlignmentFreedom> enum_names(AlignmentFreedom);
 
+enum class AlignmentMethod {
+  kRobust,  ///< ours: the farther a point is off, the less its weight; its reach shrinks from iteration to iteration
+  kPclIcp,  ///< PCL's: every pair within max_distance counts alike
+};
+EnumNames<AlignmentMethod> enum_names(AlignmentMethod);
+
 struct ScanAlignerParameters {
+  AlignmentMethod alignment_method{AlignmentMethod::kRobust};
   AlignmentFreedom freedom{AlignmentFreedom::kPlanar};
   int max_iterations{15};
   int max_points{1500};
@@ -35,6 +42,8 @@ struct ScanAlignerParameters {
   double max_correction_angle{0.17};
 
   void visit(ParameterVisitor& v) {
+    v("alignment_method", alignment_method,
+      "point-to-plane ICP; robust: ours; pcl_icp: pcl::IterativeClosestPointWithNormals");
     v("freedom", freedom, "degrees of freedom of the alignment; planar: x, y and yaw; full: all six");
     v("max_iterations", max_iterations, between(1, 1000), "", "greatest number of iterations of an alignment");
     v("max_points", max_points, at_least(50), "",
@@ -88,8 +97,9 @@ struct Alignment {
 };
 
 /// Point-to-plane ICP (Chen & Medioni 1992) of a scan to a map with a check of its health. Nearest points come from
-/// PCL's kd-tree. The steps are taken here and not by pcl::IterativeClosestPointWithNormals, as that tells neither
-/// which points were inliers nor how well each direction was constrained, which is what the outcome needs.
+/// PCL's kd-tree. Whichever method finds the pose, it is judged by the same figures: which points are inliers, and how
+/// well each direction is constrained. pcl::IterativeClosestPointWithNormals tells neither, and moves in all six
+/// directions: with kPlanar x, y and yaw are taken of what it finds.
 class ScanAligner {
  public:
   /// `map` (m, map frame) is copied; non-finite points are left out. Throws ParameterError.

@@ -3,6 +3,7 @@
 #include "urban_gnss_localization/common/parameters.hpp"
 #include "urban_gnss_localization/gnss/datum_initializer.hpp"
 #include "urban_gnss_localization/gnss/residual_check.hpp"
+#include "urban_gnss_localization/motion/imu_heading.hpp"
 #include "urban_gnss_localization/pipeline/bias_matcher.hpp"
 #include "urban_gnss_localization/pipeline/fix_delay.hpp"
 #include "urban_gnss_localization/pipeline/input_parameters.hpp"
@@ -33,6 +34,7 @@ struct LocalizationParameters {
   InputParameters input;
   StartParameters start;
   YawRateParameters imu;
+  ImuHeadingParameters imu_orientation;
   SpeedParameters speed;
   VelocityParameters velocity;
   SatelliteParameters satellites;
@@ -46,6 +48,7 @@ struct LocalizationParameters {
     v.include(input);
     v.group("start", start, "Start and restart of the localizer.");
     v.group("imu", imu, "Yaw rate of the IMU.");
+    v.group("imu_orientation", imu_orientation, "Heading of the IMU, where its messages have an orientation.");
     v.group("speed", speed, "Speed of the odometry, and when the receiver's takes its place.");
     v.group("velocity", velocity, "Velocity of the receiver.");
     v.group("satellites", satellites, "Satellites of a fix.");

@@ -12,6 +12,7 @@
 #include "urban_gnss_localization/pipeline/bias_matcher.hpp"
 #include "urban_gnss_localization/pipeline/epoch_matcher.hpp"
 #include "urban_gnss_localization/pipeline/fix_queue.hpp"
+#include "urban_gnss_localization/pipeline/heading_source.hpp"
 #include "urban_gnss_localization/pipeline/input_clocks.hpp"
 #include "urban_gnss_localization/pipeline/localization_parameters.hpp"
 #include "urban_gnss_localization/pipeline/map_datum.hpp"
@@ -54,12 +55,15 @@ class LocalizationPipeline {
   LocalizationPipeline(const LocalizationParameters& parameters, std::unique_ptr<Localizer> localizer);
 
   void add_odometry(const OdometrySample& message);
-  /// The IMU, whose yaw rate YawRateSource puts in place of the odometry's.
+  /// The IMU, whose yaw rate YawRateSource puts in place of the odometry's, and whose heading, if it tells one, the
+  /// localizer may take.
   void add_imu(const ImuSample& sample);
   /// How the IMU is mounted: its frame in the base frame, as tf says it. Requires a unit quaternion.
   void set_imu_mounting(const Eigen::Quaterniond& base_from_imu) { imu_.set_mounting(base_from_imu); }
   /// The same of an IMU that tells nothing but its yaw rate, of the robot.
   void add_imu_yaw_rate(Stamp stamp, double yaw_rate_radps);
+  /// The IMU's heading, of the robot. With a stamp far ahead of the odometry it is left out.
+  void add_imu_heading(const HeadingSample& heading);
   void add_fix(const RawFix& fix);
   /// Whether velocities of the receiver change anything: where they are wanted, and the localizer makes use of them.
   bool takes_velocity() const {
@@ -70,7 +74,8 @@ class LocalizationPipeline {
   void add_velocity(const RawVelocity& velocity);
   /// The satellites of the fix at `stamp`, before or after it. Once satellites have come to a fix, the next waits for
   /// its own, by satellites_wait at the most, if the localizer makes use of them. Whatever the localizer, they tell
-  /// whether a fix is spoilt (IntegrityMonitor). Residuals that are not those of the fixes (ResidualCheck) are left out.
+  /// whether a fix is spoilt (IntegrityMonitor). Residuals that are not those of the fixes (ResidualCheck) are left
+  /// out.
   void add_satellites(Stamp stamp, std::vector<SatelliteObservation> satellites);
   /// The bias at a fix, where the localizer wants one.
   void add_bias(const BiasEstimate& bias);
@@ -125,6 +130,9 @@ class LocalizationPipeline {
   /// The odometry is moved by another part of its messages from now on.
   void change_odometry();
   void change_yaw_rate();
+  void correct_heading();
+  /// Compares the IMU's heading with that of fixes and motion.
+  void compare_heading();
   void process_velocities();
   void process_velocity(const RawVelocity& velocity);
   /// rad, by which what the receiver calls east is turned from the map's x axis, counter-clockwise.
@@ -171,6 +179,7 @@ class LocalizationPipeline {
   OdometrySource odometry_;
   ImuLeveller imu_;
   YawRateSource yaw_rate_;
+  HeadingSource heading_;
   SpeedSource speed_;
   VelocityQueue velocities_;
   FixQueue fixes_;

@@ -5,16 +5,19 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "urban_gnss_localization/common/stamp.hpp"
 #include "urban_gnss_localization/geometry/pose2.hpp"
 #include "urban_gnss_localization/gnss/gnss_covariance.hpp"
+#include "urban_gnss_localization/motion/imu_sample.hpp"
 #include "urban_gnss_localization/occlusion/kd_tree_ray_tracer.hpp"
 #include "urban_gnss_localization/occlusion/local_map.hpp"
 #include "urban_gnss_localization/occlusion/visibility.hpp"
 #include "urban_gnss_localization/occlusion/voxel_ray_tracer.hpp"
 #include "urban_gnss_localization/pipeline/epoch_matcher.hpp"
+#include "urban_gnss_localization/pipeline/heading_source.hpp"
 #include "urban_gnss_localization/pipeline/map_consistency.hpp"
 
 namespace urban_gnss {
@@ -76,6 +79,7 @@ struct OcclusionPipelineParameters {
   KdTreeRayTracerParameters kdtree_tracer;
   GnssCovarianceParameters covariance;
   MapConsistencyParameters consistency;
+  ImuHeadingParameters imu_orientation;
 
   void visit(ParameterVisitor& v) {
     v.include(occlusion);
@@ -87,6 +91,7 @@ struct OcclusionPipelineParameters {
     v.group("kdtree_tracer", kdtree_tracer, "Algorithm 2 of Maier and Kleiner (tracer kdtree).");
     v.group("covariance", covariance, "Covariance of a fix, from the visible satellites.");
     v.group("consistency", consistency, "Agreement of map and satellites.");
+    v.group("imu_orientation", imu_orientation, "Heading of the IMU, where its messages have an orientation.");
   }
 };
 
@@ -144,6 +149,13 @@ class OcclusionPipeline {
   void set_antenna(const Eigen::Vector3d& place);
   /// Ignored where its pose is not finite.
   void set_alignment(const WorldAlignment& alignment);
+  /// The IMU in its own frame. Its heading turns the guess of a scan's pose, and the sky where it is surer than that of
+  /// the alignment (Maier & Kleiner, sections III-A and V).
+  void add_imu(const ImuSample& sample);
+  /// How the IMU is mounted: its frame in the base frame, as tf says it. Requires a unit quaternion.
+  void set_imu_mounting(const Eigen::Quaterniond& base_from_imu) { imu_.set_mounting(base_from_imu); }
+  /// The same of an IMU that tells nothing but the robot's heading.
+  void add_imu_heading(const HeadingSample& heading) { heading_.add(heading); }
   /// Angles that are not finite are left out. `angle_resolution_rad`: step that the receiver rounds to; 0 if unknown.
   /// The latest ones are kept: a fix is weighed by those that are nearest to it in time.
   void set_satellites(Stamp stamp, std::vector<SatelliteObservation> satellites, double angle_resolution_rad);
@@ -159,6 +171,9 @@ class OcclusionPipeline {
   void reset();
   void clear_map();
 
+  /// What the IMU's heading says anew since the last call.
+  std::vector<PipelineEvent> take_events() { return std::exchange(events_, {}); }
+
   const LocalMap& local_map() const { return local_map_; }
   /// As the mode leaves them.
   const OcclusionPipelineParameters& parameters() const { return parameters_; }
@@ -169,6 +184,11 @@ class OcclusionPipeline {
  private:
   std::optional<AntennaPose> antenna_at(Stamp stamp, const std::optional<Eigen::Isometry3d>& base_in_odom,
                                         std::string& missing) const;
+  /// How the odometry frame lies in the world at `stamp`, by the alignment or the IMU, whichever is surer; nothing
+  /// where neither is known.
+  std::optional<WorldAlignment> alignment_at(Stamp stamp, const std::optional<Eigen::Isometry3d>& base_in_odom) const;
+  /// Compares the IMU's heading with that of the alignment.
+  void compare_heading(Stamp stamp, const Eigen::Isometry3d& base_in_odom);
   SkyObservation observe_sky(const AntennaPose& antenna) const;
   /// The satellites that a fix is weighed by; null where there are none, or they are too old.
   const SatelliteEpoch* satellites_for(Stamp fix) const;
@@ -183,8 +203,11 @@ class OcclusionPipeline {
   Eigen::Vector3d antenna_in_base_;
   std::optional<Stamp> last_cloud_;
   std::optional<WorldAlignment> alignment_;
+  ImuLeveller imu_;
+  HeadingSource heading_;
   bool has_prior_{false};
   EpochMatcher epochs_;
+  std::vector<PipelineEvent> events_;
 };
 
 }  // namespace urban_gnss

@@ -87,6 +87,8 @@ class OcclusionQueue {
   /// Only keeps the cloud for work(): of those that wait the oldest is dropped where they are too many.
   void add_cloud(QueuedCloud cloud);
   void add_satellites(const SatelliteEpoch& epoch);
+  /// `frame` of the IMU: its place in base_link tells how it is mounted. Until that is known, its axes are the base's.
+  void add_imu(const ImuSample& sample, const std::string& frame);
   /// Keeps the fix for work(). One that is not newer than the one before it is left out, and is not settled.
   void add_fix(QueuedFix fix);
   /// How well the localizer knows the heading, rad^2; the heading itself is that of map -> odom.
@@ -127,6 +129,8 @@ class OcclusionQueue {
   FrameSource& transforms_;
   OcclusionPipeline pipeline_;
   bool antenna_known_;
+  bool imu_mounting_known_{false};
+  Stamp next_mounting_{0};  ///< from when on it is looked for again
   PointCloud prior_;
   bool prior_is_in_{false};
   StampMonitor fix_stamps_;

@@ -83,6 +83,12 @@ class StartSupervisor {
   std::optional<Start> find_restart(const StartFix& fix, const Eigen::Vector2d& predicted, bool is_contradicted,
                                     std::vector<PipelineEvent>& events);
 
+  /// The stamp of the last fix that was remembered.
+  const std::optional<Stamp>& remembered() const { return last_remembered_; }
+  /// The antenna's pose at that fix by fixes and motion alone, whatever the localizer says; nothing where they do not
+  /// tell it.
+  std::optional<PoseEstimate> by_motion() const { return heading_.estimate(); }
+
   /// The localizer was started from `start`.
   void note(const Start& start);
   /// The place is unknown. Forgets what fixes and motion said of it until now.

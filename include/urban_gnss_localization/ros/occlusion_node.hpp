@@ -3,6 +3,7 @@
 #include <diagnostic_updater/diagnostic_updater.h>
 #include <nav_msgs/Odometry.h>
 #include <ros/ros.h>
+#include <sensor_msgs/Imu.h>
 #include <std_srvs/Trigger.h>
 #include <tf2_ros/transform_listener.h>
 #include <urban_gnss_localization/SaveMap.h>
@@ -35,6 +36,7 @@ class OcclusionNode {
   void on_cloud(const sensor_msgs::PointCloud2ConstPtr& message);
   void on_satellites(const urban_gnss_localization::SatelliteArray& message);
   void on_estimate(const nav_msgs::Odometry& message);
+  void on_imu(const sensor_msgs::Imu& message);
   void on_fix(const sensor_msgs::NavSatFixConstPtr& message);
   void work();
   void log();
@@ -64,6 +66,7 @@ class OcclusionNode {
   ros::Subscriber satellites_subscriber_;
   ros::Subscriber cloud_subscriber_;
   ros::Subscriber estimate_subscriber_;
+  ros::Subscriber imu_subscriber_;
   ros::ServiceServer clear_service_;
   ros::ServiceServer save_service_;
   ros::WallTimer work_timer_;

@@ -38,6 +38,8 @@ class CitySimulator : public Simulator {
   };
   AntennaState antenna_state() const { return {vehicle_.antenna_position(), vehicle_.antenna_velocity()}; }
   void receive(double interval_s);
+  /// Puts the compass's heading into the IMU's message.
+  void orient(ImuMessage& imu);
   void add(Stamp published, SimulationEvent event);
   template <class Content>
   void add(Content content) {
@@ -50,6 +52,8 @@ class CitySimulator : public Simulator {
   RouteFollower autopilot_;
   WheelOdometry odometry_;
   ImuSensor imu_;
+  Compass compass_;
+  double compass_read_s_{0.0};  ///< when, since the start
   Sky sky_;
   SignalTracer tracer_;
   Receiver receiver_;

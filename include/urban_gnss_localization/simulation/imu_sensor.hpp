@@ -36,13 +36,15 @@ struct ImuParameters {
   }
 };
 
-/// Axes of base_link (x forward, y left, z up). The unit gives no orientation.
+/// Axes of base_link (x forward, y left, z up).
 struct ImuMessage {
   double stamp_s{0.0};  ///< since the start
   Eigen::Vector3d angular_velocity_radps{Eigen::Vector3d::Zero()};
   Eigen::Vector3d acceleration_mps2{Eigen::Vector3d::Zero()};  ///< specific force: +g on z at rest
   double angular_velocity_variance{0.0};                       ///< (rad/s)^2, of each axis
   double acceleration_variance{0.0};                           ///< (m/s^2)^2, of each axis
+  std::optional<double> yaw_rad{};                             ///< by the unit's compass, where it has one (Compass)
+  double yaw_variance{0.0};                                    ///< rad^2, that it claims
 };
 
 /// An inertial unit in base_link of a planar robot (roll = pitch = 0).

@@ -6,6 +6,7 @@
 #include "urban_gnss_localization/common/stamp.hpp"
 #include "urban_gnss_localization/geometry/pose2.hpp"
 #include "urban_gnss_localization/gnss/fix.hpp"
+#include "urban_gnss_localization/simulation/compass.hpp"
 #include "urban_gnss_localization/simulation/constellation.hpp"
 #include "urban_gnss_localization/simulation/fix_faults.hpp"
 #include "urban_gnss_localization/simulation/imu_sensor.hpp"
@@ -35,6 +36,7 @@ struct Scenario {
   RouteFollowerParameters autopilot;
   WheelOdometryParameters odometry;
   ImuParameters imu;
+  CompassParameters compass;
   SkyParameters sky;
   SignalParameters signals;
   ReceiverParameters receiver;

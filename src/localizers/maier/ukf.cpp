@@ -21,6 +21,9 @@ constexpr int kYaw = 2;
 template <int Rows, int Most>
 using BothWays = Eigen::Matrix<double, Rows, Eigen::Dynamic, 0, Rows, 2 * Most>;
 
+/// Square of the standard deviations beyond which a bearing is not believed.
+constexpr double kBearingGate = 9.0;
+
 constexpr double kUnknownYawVariance = kPi * kPi / 3.0;
 
 /// g of eq. (1): the pose after one step of odometry, freed of the errors that the state holds.
@@ -251,6 +254,18 @@ FixOutcome Ukf::correct(const FixMeasurement& declared) {
   fix.covariance = effective;
   learn(fix, outcome.nis, prediction.position, before);
   return outcome;
+}
+
+void Ukf::correct_heading(const HeadingMeasurement& heading) {
+  if (!is_usable(heading)) return;
+  const double known = covariance_(kYaw, kYaw);
+  const double told = heading.sigma_rad * heading.sigma_rad;
+  const double innovation = angle_difference(heading.yaw_rad, state_[kYaw]);
+  if (known <= told || innovation * innovation > kBearingGate * (known + told)) return;
+  // The innovation's variance that leaves the yaw with `told`: known (1 - known / innovation variance) = told.
+  const double innovation_variance = known * known / (known - told);
+  const State gain = covariance_.col(kYaw) / innovation_variance;
+  accept(state_ + gain * innovation, covariance_ - innovation_variance * gain * gain.transpose());
 }
 
 void Ukf::learn(const FixMeasurement& declared, double nis, const Eigen::Vector2d& antenna, const State& before) {

@@ -39,6 +39,7 @@ class OcclusionStage {
   void add_odometry(const nav_msgs::Odometry& message);
   void add_cloud(const sensor_msgs::PointCloud2ConstPtr& message);
   void add_satellites(const SatelliteEpoch& epoch);
+  void add_imu(const ImuSample& sample, const std::string& frame) { queue_.add_imu(sample, frame); }
   void add_fix(const sensor_msgs::NavSatFix& message);
   /// Where the localizer says that the robot is. `map_to_odom` as it would be broadcast.
   void add_estimate(const LocalizationOutput& output, const geometry_msgs::TransformStamped& map_to_odom);

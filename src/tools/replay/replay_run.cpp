@@ -57,7 +57,10 @@ void ReplayRun::add_odometry(const nav_msgs::Odometry& message) {
 void ReplayRun::add_imu(const sensor_msgs::Imu& message) {
   sensor_frames_.observe_imu(message.header.frame_id);
   look_up_sensors();
-  if (const auto sample = to_imu_sample(message)) pipeline_.add_imu(*sample);
+  const auto sample = to_imu_sample(message);
+  if (!sample) return;
+  pipeline_.add_imu(*sample);
+  if (occlusion_) occlusion_->add_imu(*sample, without_leading_slash(message.header.frame_id));
 }
 
 void ReplayRun::add_static_tf(const tf2_msgs::TFMessage& message) {

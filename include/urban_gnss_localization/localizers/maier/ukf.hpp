@@ -119,6 +119,11 @@ class Ukf : public Localizer {
   void doubt(const MotionDoubt& doubt) override;
   /// kRejectedNonFinite for a fix that is not finite or has no positive definite covariance.
   FixOutcome correct(const FixMeasurement& fix) override;
+  bool takes_heading() const override { return true; }
+  /// The IMU's bearing. Its errors last, so it makes the yaw no surer than it is itself: a yaw that is surer stays as
+  /// it is, any other gets the bearing's standard deviation. One that is not finite, or beyond 3 standard deviations,
+  /// is left out.
+  void correct_heading(const HeadingMeasurement& heading) override;
   Pose2 pose() const override { return {state_[0], state_[1], state_[2]}; }
   PoseEstimate estimate() const override;
   LocalizerHealth health() const override;
