@@ -10,14 +10,14 @@ BiasPipeline::BiasPipeline(const BiasPipelineParameters& parameters)
     : parameters_(parameters),
       antenna_(parameters.input.antenna()),
       tracker_(parameters.bias),
-      clocks_(parameters.input.stamps),
+      clocks_(parameters.input.stamps,
+              {[this](const std::string& why) { reset(why); }, [this](InputStream stream) { restart(stream); }}),
       history_(kHistory_s),
       fixes_(parameters.input.fix_validation) {}
 
 void BiasPipeline::reset(const std::string& why) {
   if (!why.empty()) events_.push_back({PipelineEvent::Level::kWarn, "reset: " + why});
   tracker_.reset();
-  clocks_.reset();
   odometry_.reset();
   history_.clear();
   poses_.clear();
@@ -27,17 +27,23 @@ void BiasPipeline::reset(const std::string& why) {
 void BiasPipeline::set_datum(const GeodeticPosition& datum) {
   if (frame_ && frame_->datum() == datum) return;
   LocalFrame frame(datum);  // throws before anything changes
-  if (frame_) reset("the datum moved");
+  if (frame_) {
+    reset("the datum moved");
+    clocks_.reset();
+  }
   frame_ = std::move(frame);
 }
 
-bool BiasPipeline::is_new(InputStream stream, Stamp stamp) {
-  return clocks_.accept(stream, stamp, [this](const std::string& why) { reset(why); });
+void BiasPipeline::restart(InputStream stream) {
+  if (stream == InputStream::kFixes) fixes_.reset();
+  if (stream == InputStream::kEstimates) poses_.clear();
 }
 
 void BiasPipeline::add_odometry(const OdometrySample& told) {
   if (!OdometrySource::fault_of(told).empty()) return;
-  if (!is_new(InputStream::kOdometry, told.stamp)) return;
+  if (!clocks_.accept(
+          InputStream::kOdometry, told.stamp, [this, told] { add_odometry(told); }, events_))
+    return;
   std::vector<PipelineEvent> said_by_the_localizer;
   const OdometrySample sample = odometry_.resolve(told, said_by_the_localizer);
   const double odometry_gap = parameters_.input.stamps.odometry_gap;
@@ -52,7 +58,8 @@ void BiasPipeline::add_odometry(const OdometrySample& told) {
 
 void BiasPipeline::add_estimate(Stamp stamp, const Pose2& pose) {
   if (!is_finite(pose)) return;
-  if (!is_new(InputStream::kEstimates, stamp)) return;
+  const auto again = [this, stamp, pose] { add_estimate(stamp, pose); };
+  if (!clocks_.accept(InputStream::kEstimates, stamp, again, events_)) return;
   poses_.emplace_back(stamp, pose);
   while (poses_.size() > 2 && to_seconds(stamp - poses_.front().first) > kHistory_s) poses_.pop_front();
   process_fixes();
@@ -61,10 +68,22 @@ void BiasPipeline::add_estimate(Stamp stamp, const Pose2& pose) {
 void BiasPipeline::add_fix(const RawFix& fix) {
   if (!frame_) return;
   // A receiver that does not know where it is may not know the time either. What is not new, the validation rejects.
-  if (is_usable_position(fix) && fix.stamp != Stamp::zero()) is_new(InputStream::kFixes, fix.stamp);
+  if (is_usable_position(fix) && fix.stamp != Stamp::zero()) {
+    const auto again = [this, fix] { add_fix(fix); };
+    const auto refuse = [this, fix](const std::string& why) { refuse_fix(fix.stamp, why); };
+    if (clocks_.judge(InputStream::kFixes, fix.stamp, again, events_, refuse) == StampVerdict::kOdd) return;
+  }
   if (const auto rejected = fixes_.add(fix)) pass_on(*rejected);
   for (const FixOutcome& rejected : fixes_.validate(*frame_)) pass_on(rejected);
   process_fixes();
+}
+
+void BiasPipeline::refuse_fix(Stamp stamp, const std::string& reason) {
+  FixOutcome outcome;
+  outcome.stamp = stamp;
+  outcome.decision = FixDecision::kRejectedStale;
+  outcome.reason = reason;
+  pass_on(outcome);
 }
 
 void BiasPipeline::pass_on(const FixOutcome& outcome) {

@@ -30,7 +30,7 @@ void LocalizationPipeline::add_odometry(const OdometrySample& message) {
     event(Level::kWarn, "odometry left out: " + fault);
     return;
   }
-  if (!is_new(InputStream::kOdometry, message.stamp)) return;
+  if (!is_new(InputStream::kOdometry, message.stamp, [this, message] { add_odometry(message); })) return;
   offsets_.add_odometry(message.stamp, events_);
   const OdometrySample sample = odometry_.resolve(message, events_);
   if (odometry_.has_changed()) change_odometry();
@@ -48,12 +48,14 @@ void LocalizationPipeline::add_odometry(const OdometrySample& message) {
     const MotionDoubt doubt{speed_.doubt_m2(), yaw_rate_.doubt_rad2()};
     if (doubt.exists()) doubt_motion(doubt);
     correct_heading();
-    guard_against_non_finite();
+    guard_state({localizer_->pose(), Eigen::Matrix3d::Zero()});
   }
   if (!initialized() && start_.given() && frame()) start_from(told(*start_.given(), "the given pose"));
   process_velocities();
   process_fixes();
-  if (initialized()) outputs_.push_back({sample.stamp, estimate(), sample.pose, twist});
+  if (!initialized()) return;
+  const PoseEstimate published = estimate();
+  if (guard_state(published)) outputs_.push_back({sample.stamp, published, sample.pose, twist});
 }
 
 void LocalizationPipeline::doubt_motion(const MotionDoubt& doubt) {
@@ -130,7 +132,7 @@ void LocalizationPipeline::add_imu_rate(const ImuYawRate& rate) {
     }
     return;
   }
-  if (is_new(InputStream::kImu, rate.stamp)) yaw_rate_.add(rate);
+  if (is_new(InputStream::kImu, rate.stamp, [this, rate] { add_imu_rate(rate); })) yaw_rate_.add(rate);
 }
 
 void LocalizationPipeline::add_velocity(const RawVelocity& velocity) {
@@ -138,7 +140,12 @@ void LocalizationPipeline::add_velocity(const RawVelocity& velocity) {
   std::string fault = velocity_fault(velocity);
   offsets_.add(InputStream::kVelocities, velocity.stamp);
   if (fault.empty() && is_far_ahead(velocity.stamp)) fault = far_ahead(InputStream::kVelocities);
-  if (fault.empty() && !is_new(InputStream::kVelocities, velocity.stamp)) fault = "not newer than the last";
+  if (fault.empty()) {
+    const StampVerdict verdict =
+        judge(InputStream::kVelocities, velocity.stamp, [this, velocity] { add_velocity(velocity); });
+    if (verdict == StampVerdict::kOdd) return;  // the clocks say so, if it is not followed
+    if (verdict == StampVerdict::kNotNewer) fault = "not newer than the last";
+  }
   if (!fault.empty()) {
     event(Level::kWarn, "velocity of the receiver left out: " + fault);
     return;
@@ -169,7 +176,7 @@ void LocalizationPipeline::process_velocity(const RawVelocity& velocity) {
   if (!initialized() || !localizer_->takes_velocity()) return;
   localizer_->correct_velocity(matched->measurement);
   reporter_.count_velocity();
-  guard_against_non_finite();
+  guard_state(localizer_->estimate());
 }
 
 void LocalizationPipeline::compare_speed(const MatchedVelocity& velocity) {

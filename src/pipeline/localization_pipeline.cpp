@@ -7,6 +7,8 @@
 #include "limits.hpp"
 #include "text.hpp"
 #include "told_start.hpp"
+#include "urban_gnss_localization/common/positive_definite.hpp"
+#include "urban_gnss_localization/geometry/pose_faults.hpp"
 
 namespace urban_gnss {
 
@@ -21,7 +23,8 @@ LocalizationPipeline::LocalizationPipeline(const LocalizationParameters& paramet
     : parameters_(parameters),
       localizer_(std::move(localizer)),
       antenna_(parameters.input.antenna()),
-      clocks_(parameters.input.stamps),
+      clocks_(parameters.input.stamps,
+              {[this](const std::string& why) { reset(why); }, [this](InputStream stream) { restart(stream); }}),
       datum_(parameters.datum),
       history_(kHistory_s),
       yaw_rate_(parameters.imu, parameters.input.stamps.odometry_gap),
@@ -63,10 +66,16 @@ void LocalizationPipeline::reset(const std::string& why) {
   if (frame()) event(Level::kInfo, datum_.describe());
 }
 
-bool LocalizationPipeline::is_new(InputStream stream, Stamp stamp) {
-  const bool is_new = clocks_.accept(stream, stamp, [this](const std::string& why) { reset(why); });
-  if (!is_new) note_unset_stamp(stream, stamp);
-  return is_new;
+StampVerdict LocalizationPipeline::judge(InputStream stream, Stamp stamp, const InputClocks::Again& again,
+                                         const InputClocks::Refuse& refuse) {
+  const StampVerdict verdict = clocks_.judge(stream, stamp, again, events_, refuse);
+  if (verdict != StampVerdict::kNew) note_unset_stamp(stream, stamp);
+  return verdict;
+}
+
+void LocalizationPipeline::restart(InputStream stream) {
+  if (stream == InputStream::kFixes) fixes_.reset();
+  if (stream == InputStream::kVelocities) velocities_.reset();
 }
 
 void LocalizationPipeline::note_unset_stamp(InputStream stream, Stamp stamp) {
@@ -120,15 +129,18 @@ std::optional<BiasQuery> LocalizationPipeline::bias_query() const {
 void LocalizationPipeline::add_fix(const RawFix& fix) {
   if (fix.has_fix) offsets_.add(InputStream::kFixes, fix.stamp);
   if (is_far_ahead(fix.stamp)) {
-    FixOutcome outcome;
-    outcome.stamp = fix.stamp;
-    decide_stale(std::move(outcome), far_ahead(InputStream::kFixes));
+    refuse_fix(fix.stamp, far_ahead(InputStream::kFixes));
     return;
   }
   // A receiver that does not know where it is may not know the time either, and a stamp that was not set is no time.
   // What is not new, the queue rejects.
-  if (is_usable_position(fix) && fix.stamp != Stamp::zero()) is_new(InputStream::kFixes, fix.stamp);
-  if (is_usable_position(fix)) place_ = fix.position;
+  if (is_usable_position(fix) && fix.stamp != Stamp::zero()) {
+    const StampVerdict verdict = judge(
+        InputStream::kFixes, fix.stamp, [this, fix] { add_fix(fix); },
+        [this, fix](const std::string& why) { refuse_fix(fix.stamp, why); });
+    if (verdict == StampVerdict::kOdd) return;
+    place_ = fix.position;
+  }
   const auto rejected = fixes_.add(fix);
   for (PipelineEvent& mistake : fixes_.take_events()) events_.push_back(std::move(mistake));
   if (rejected) {
@@ -142,6 +154,12 @@ void LocalizationPipeline::add_fix(const RawFix& fix) {
     if (frame()) event(Level::kInfo, datum_.describe());
   }
   process_fixes();
+}
+
+void LocalizationPipeline::refuse_fix(Stamp stamp, const std::string& reason) {
+  FixOutcome outcome;
+  outcome.stamp = stamp;
+  decide_stale(std::move(outcome), reason);
 }
 
 void LocalizationPipeline::process_fixes() {
@@ -244,7 +262,7 @@ void LocalizationPipeline::correct_with(const ValidatedFix& fix) {
   if (outcome.decision == FixDecision::kAccepted) outcome.decision = fix.outcome.decision;
   if (outcome.reason.empty()) outcome.reason = fix.outcome.reason;
   decide(std::move(outcome));
-  guard_against_non_finite();
+  guard_state(localizer_->estimate());
 }
 
 void LocalizationPipeline::watch_integrity(const ValidatedFix& fix, const Eigen::Vector2d& antenna_in_body) {
@@ -279,7 +297,7 @@ void LocalizationPipeline::decide(FixOutcome outcome) {
 
 void LocalizationPipeline::set_pose(const PoseEstimate& pose) {
   start_.give(pose);
-  if (frame() && !history_.empty()) start_from(told(pose, "a pose that was set"));
+  if (frame() && !history_.empty()) start_from(told(*start_.given(), "a pose that was set"));
 }
 
 void LocalizationPipeline::set_datum(const GeodeticPosition& datum) {
@@ -320,14 +338,20 @@ std::optional<Eigen::Vector2d> LocalizationPipeline::predicted_antenna(Stamp sta
   return transform_point(compose(localizer_->pose(), *motion), antenna_);
 }
 
-void LocalizationPipeline::guard_against_non_finite() {
-  if (is_finite(localizer_->pose())) return;
-  event(Level::kError, "the estimate is not finite: starting anew from the fixes");
+bool LocalizationPipeline::guard_state(const PoseEstimate& estimate) {
+  const std::string fault = estimate_fault(estimate);
+  if (fault.empty()) return true;
+  event(Level::kError, "the estimate is none (" + fault + "): starting anew from the fixes");
+  ++broken_states_;
   start_.lose_place();
+  return false;
 }
 
 PoseEstimate LocalizationPipeline::estimate() const {
   PoseEstimate published = localizer_->estimate();
+  if (estimate_fault(published).empty() && !is_positive_definite<3>(published.covariance)) {
+    published.covariance = nearest_positive_definite<3>(published.covariance);  // of particles that are all the same
+  }
   if (!localizer_->is_as_printed()) published.covariance.topLeftCorner<2, 2>() += integrity_.covariance();
   return published;
 }

@@ -8,8 +8,7 @@ MapDatum::MapDatum(const DatumParameters& parameters) : parameters_(parameters),
 
 void MapDatum::reset() {
   initializer_.reset();
-  if (was_set_) return;
-  frame_.reset();
+  if (frame_) return;
   if (const auto datum = initializer_.fixed()) use(*datum, "parameter");
 }
 
@@ -23,7 +22,6 @@ void MapDatum::add(const RawFix& fix) {
 bool MapDatum::set(const GeodeticPosition& datum) {
   const bool is_another = !frame_ || !(frame_->datum() == datum);
   if (is_another) use(datum, "request");
-  was_set_ = true;
   return is_another;
 }
 

@@ -5,11 +5,14 @@
 #include <utility>
 
 #include "text.hpp"
+#include "urban_gnss_localization/geometry/pose_faults.hpp"
 
 namespace urban_gnss {
 namespace {
 
 constexpr double kFarSigmas = 3.0;
+/// Of a pose that is told, standard deviations beyond it say no more.
+constexpr double kFarthest_m = 1e5;
 /// Fixes closer together than this share their error: for the start they count as one.
 constexpr double kStartFixInterval_s = 1.0;
 
@@ -33,10 +36,22 @@ StartSupervisor::StartSupervisor(const StartParameters& parameters)
 }
 
 void StartSupervisor::give(const PoseEstimate& pose) {
-  if (!is_finite(pose.pose) || !pose.covariance.allFinite()) {
-    throw std::invalid_argument("pose or covariance is not finite");
-  }
+  const std::string fault = estimate_fault(pose);
+  if (!fault.empty()) throw std::invalid_argument(fault);
+  const double p2 = parameters_.initial_position_sigma * parameters_.initial_position_sigma;
+  const double h2 = parameters_.initial_heading_sigma * parameters_.initial_heading_sigma;
+  const Eigen::Vector3d default_variance(p2, p2, h2);
+  const Eigen::Vector3d most(kFarthest_m * kFarthest_m, kFarthest_m * kFarthest_m, kPi * kPi / 3.0);
   given_ = pose;
+  Eigen::Matrix3d& covariance = given_->covariance;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double variance = covariance(axis, axis);
+    if (variance == 0.0) covariance(axis, axis) = default_variance(axis);  // its covariances are 0, too
+    if (variance <= most(axis)) continue;
+    const double factor = std::sqrt(most(axis) / variance);
+    covariance.row(axis) *= factor;
+    covariance.col(axis) *= factor;
+  }
 }
 
 bool StartSupervisor::remember(const StartFix& fix) {

@@ -36,6 +36,7 @@ bool is_usable_yaw_rate(double yaw_rate_radps) {
 }
 
 void YawRateSource::add(const ImuYawRate& rate) {
+  while (!rates_.empty() && rates_.back().stamp >= rate.stamp) rates_.pop_back();  // the IMU's clock was set back
   rates_.push_back(rate);
   while (rates_.size() > 1 && to_seconds(rate.stamp - rates_.front().stamp) > kKept_s) rates_.pop_front();
 }

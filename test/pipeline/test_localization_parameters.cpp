@@ -39,7 +39,9 @@ std::string trace(const std::string& base, const std::string& change, bool wants
     }
     if (k == 30 || k == 350) rig.pipeline.add_satellites(Rig::at(time), {});  // the next fix has none
     if (k < 300 || k > 315) rig.drive(time);
-    if (k == 350) rig.drive(time - 0.7);  // late, and not a clock that was set back
+    for (const double late_s : {0.7, 0.65, 0.6}) {
+      if (k == 350) rig.drive(time - late_s);  // late, and not a clock that was set back
+    }
     note();
   }
   for (const FixMeasurement& fix : rig.fake->fixes) {

@@ -229,9 +229,9 @@ TEST(LocalizationPipeline, StampsAscendAcrossAResetThatIsAskedFor) {
   rig.drive(5.1);
   EXPECT_EQ(rig.pipeline.take_outputs().size(), 1u);
   // A recording that starts over is still seen as that.
-  rig.drive(0.0);
+  for (const double time : {0.0, 0.1, 0.2}) rig.drive(time);
   EXPECT_TRUE(has_event(rig.pipeline, PipelineEvent::Level::kWarn, "jumped back"));
-  EXPECT_EQ(rig.pipeline.take_outputs().size(), 1u);
+  EXPECT_EQ(rig.pipeline.take_outputs().size(), 3u);
 }
 
 using MakeFilter = std::unique_ptr<Localizer> (*)(int particle_count);
@@ -251,10 +251,9 @@ constexpr MakeFilter make_switching_filter = [](int) -> std::unique_ptr<Localize
 };
 
 TEST(LocalizationPipeline, ClockSetBackGivesTheSameRunAgain) {
-  for (const auto& [with_datum, make] :
-       {std::pair{false, make_paper_filter}, {true, make_paper_filter}, {true, make_switching_filter}}) {
+  for (const auto& make : {make_paper_filter, make_switching_filter}) {
     LocalizationParameters parameters;
-    if (with_datum) parameters.datum.datum = {33.0, 130.0, 20.0};
+    parameters.datum.datum = {33.0, 130.0, 20.0};
     Rig rig(parameters, make(100));
     std::vector<LocalizationOutput> passes[2];
     for (auto& pass : passes) {

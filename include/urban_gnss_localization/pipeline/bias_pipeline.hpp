@@ -37,6 +37,8 @@ class BiasPipeline {
  public:
   /// Requires parameters without faults.
   explicit BiasPipeline(const BiasPipelineParameters& parameters);
+  BiasPipeline(const BiasPipeline&) = delete;  // its clocks refer to it
+  BiasPipeline& operator=(const BiasPipeline&) = delete;
 
   void set_datum(const GeodeticPosition& datum);
   /// Sets the antenna's place in the base frame (m), e.g. as tf says it. Requires finite numbers.
@@ -45,6 +47,8 @@ class BiasPipeline {
   /// The localizer's estimate of the base in the map frame.
   void add_estimate(Stamp stamp, const Pose2& pose);
   void add_fix(const RawFix& fix);
+  /// A fix that nothing can be said of but why it is not used.
+  void refuse_fix(Stamp stamp, const std::string& reason);
   void reset(const std::string& why);
 
   /// One estimate a fix, rejected fixes included.
@@ -57,7 +61,8 @@ class BiasPipeline {
   void process_fixes();
   bool process_next_fix();
   std::optional<Pose2> pose_at(Stamp stamp) const;
-  bool is_new(InputStream stream, Stamp stamp);
+  /// The clock of this stream alone was set back.
+  void restart(InputStream stream);
   void pass_on(const FixOutcome& outcome);
 
   BiasPipelineParameters parameters_;

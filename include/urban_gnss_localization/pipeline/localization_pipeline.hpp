@@ -53,6 +53,8 @@ class LocalizationPipeline {
  public:
   /// Requires parameters without faults.
   LocalizationPipeline(const LocalizationParameters& parameters, std::unique_ptr<Localizer> localizer);
+  LocalizationPipeline(const LocalizationPipeline&) = delete;  // its clocks refer to it
+  LocalizationPipeline& operator=(const LocalizationPipeline&) = delete;
 
   void add_odometry(const OdometrySample& message);
   /// The IMU, whose yaw rate YawRateSource puts in place of the odometry's, and whose heading, if it tells one, the
@@ -80,8 +82,12 @@ class LocalizationPipeline {
   /// The bias at a fix, where the localizer wants one.
   void add_bias(const BiasEstimate& bias);
 
-  /// Starts the filter at a pose of the map frame (m, rad), now or as soon as it can. Throws std::invalid_argument
-  /// where the pose or the covariance is not finite.
+  /// A fix that nothing can be said of but why it is not used.
+  void refuse_fix(Stamp stamp, const std::string& reason);
+
+  /// Starts the filter at a pose of the map frame (m, rad), now or as soon as it can. Variances of 0 stand for
+  /// initial_position_sigma and initial_heading_sigma. Throws std::invalid_argument where
+  /// estimate_fault() finds a fault.
   void set_pose(const PoseEstimate& pose);
   /// Sets the map frame's origin; the filter starts anew where it had another. Throws std::invalid_argument where there
   /// is no such place.
@@ -89,7 +95,7 @@ class LocalizationPipeline {
   /// Sets the antenna's place in the base frame (m), e.g. as tf says it. Requires finite numbers.
   void set_antenna_offset(const Eigen::Vector2d& offset) { antenna_ = offset; }
 
-  /// Forgets everything but parameters, a datum that was set and what the clocks said: stamps still ascend.
+  /// Forgets everything but parameters, the datum and what the clocks said: stamps still ascend.
   void reset(const std::string& why);
 
   /// What came of the messages since the last call.
@@ -103,6 +109,14 @@ class LocalizationPipeline {
   std::optional<BiasQuery> bias_query() const;
   /// Changes where the odometry's history was forgotten (reset, gap): a bias tracked across that means nothing.
   std::size_t epoch() const { return epoch_; }
+  /// Of the odometry that was used last; nothing before the first.
+  std::optional<Stamp> latest_odometry() const {
+    return history_.empty() ? std::nullopt : std::optional<Stamp>(history_.latest());
+  }
+  /// Messages that were left out for an odd stamp.
+  std::size_t odd_stamps() const { return clocks_.odd_count(); }
+  /// How often the filter's state was no estimate, and it was started anew.
+  std::size_t broken_states() const { return broken_states_; }
 
   const std::optional<LocalFrame>& frame() const { return datum_.frame(); }
   bool initialized() const { return start_.has_started(); }
@@ -116,8 +130,14 @@ class LocalizationPipeline {
 
  private:
   void add_imu_rate(const ImuYawRate& rate);
-  /// Whether the stamp is newer than the stream's last, or the stream's clock was set back, which resets everything.
-  bool is_new(InputStream stream, Stamp stamp);
+  /// Whether a message with this stamp is to be used now, kNew; `again` gives it again (InputClocks).
+  StampVerdict judge(InputStream stream, Stamp stamp, const InputClocks::Again& again,
+                     const InputClocks::Refuse& refuse = {});
+  bool is_new(InputStream stream, Stamp stamp, const InputClocks::Again& again) {
+    return judge(stream, stamp, again) == StampVerdict::kNew;
+  }
+  /// The clock of this stream alone was set back.
+  void restart(InputStream stream);
   /// A message was left out for its stamp: says once of each stream where that was never set.
   void note_unset_stamp(InputStream stream, Stamp stamp);
   /// Whether the stamp is farther ahead of the odometry than any delay explains.
@@ -158,7 +178,8 @@ class LocalizationPipeline {
   Stamp undelayed(Stamp stamp) const { return stamp - from_seconds(delay_.delay_s()); }
   /// Where the antenna was at `stamp` (m, map frame), by the estimate now; nothing outside the odometry's history.
   std::optional<Eigen::Vector2d> predicted_antenna(Stamp stamp) const;
-  void guard_against_non_finite();
+  /// Whether the estimate is one; otherwise the filter is started anew from the fixes.
+  bool guard_state(const PoseEstimate& estimate);
 
   void decide_stale(FixOutcome outcome, const std::string& reason);
   void decide(FixOutcome outcome);
@@ -176,6 +197,7 @@ class LocalizationPipeline {
   std::optional<GeodeticPosition> place_;  ///< of the last fix that has one
   OdometryHistory history_;
   std::size_t epoch_{0};
+  std::size_t broken_states_{0};
   OdometrySource odometry_;
   ImuLeveller imu_;
   YawRateSource yaw_rate_;

@@ -19,7 +19,7 @@ class MapDatum {
 
   /// Takes a fix into account while there is no datum.
   void add(const RawFix& fix);
-  /// Sets the datum, which reset() then keeps. Returns whether the frame is another one than before. Throws
+  /// Sets the datum. Returns whether the frame is another one than before. Throws
   /// std::invalid_argument where there is no such place.
   bool set(const GeodeticPosition& datum);
 
@@ -28,7 +28,7 @@ class MapDatum {
   /// What is missing, for people; empty where there is a datum.
   std::string waiting_for() const { return initializer_.waiting_for(); }
 
-  /// Forgets fixes, and what came of them.
+  /// Forgets fixes. A datum stays: what has been published in the map frame keeps its place.
   void reset();
 
  private:
@@ -38,7 +38,6 @@ class MapDatum {
   DatumInitializer initializer_;
   std::optional<LocalFrame> frame_;
   std::string source_;
-  bool was_set_{false};
 };
 
 }  // namespace urban_gnss
