@@ -22,6 +22,8 @@ void LocalMap::clear() {
   correction_.setIdentity();
   has_keyframe_ = false;
   odometry_from_bearing_rad_.reset();
+  is_placed_ = true;
+  unplaced_m_ = 0.0;
 }
 
 ScanReport LocalMap::add_scan(const PointCloud& scan, const Eigen::Isometry3d& sensor_in_base,
@@ -48,11 +50,13 @@ ScanReport LocalMap::add_scan(const PointCloud& scan, const Eigen::Isometry3d& s
         correction_ = sensor_in_map * sensor_in_base.inverse() * base_in_map.inverse();
       }
     }
+    note_placement(report.alignment, base_in_map);
     last_keyframe_ = base_in_map;
     has_keyframe_ = true;
   }
   report.base_in_map = sensor_in_map * sensor_in_base.inverse();
-  report.insertion = map_.add_scan(transformed(kept, sensor_in_map), sensor_in_map.translation());
+  report.is_placed = is_placed_;
+  if (is_placed_) report.insertion = map_.add_scan(transformed(kept, sensor_in_map), sensor_in_map.translation());
   return report;
 }
 
@@ -69,6 +73,14 @@ void LocalMap::follow(std::optional<double> bearing_rad, const Eigen::Isometry3d
   if (std::abs(excess_rad) > aligner_parameters_.max_correction_angle) return;
   const Eigen::Translation3d place((correction_ * base_in_map).translation());
   correction_ = place * Eigen::AngleAxisd(excess_rad, Eigen::Vector3d::UnitZ()) * place.inverse() * correction_;
+}
+
+void LocalMap::note_placement(const Alignment& alignment, const Eigen::Isometry3d& base_in_map) {
+  const bool was_tried = alignment.decision != AlignmentDecision::kNotTried &&
+                         alignment.decision != AlignmentDecision::kTooFewPoints;  // nothing to align, or to align with
+  const bool was_refused = was_tried && !alignment.is_accepted();
+  unplaced_m_ = is_placed_ ? 0.0 : unplaced_m_ + (last_keyframe_.inverse() * base_in_map).translation().norm();
+  is_placed_ = !was_refused || unplaced_m_ >= parameters_.unplaced_distance;
 }
 
 PointCloud LocalMap::cut(const PointCloud& scan, const Eigen::Isometry3d& sensor_in_base, ScanReport& report) const {

@@ -36,6 +36,7 @@ const char* to_string(CloudDecision decision) {
     case CloudDecision::kNotNewer: return "not newer than the cloud before it";
     case CloudDecision::kEmpty: return "no point in reach";
     case CloudDecision::kNotFinite: return "transform not finite";
+    case CloudDecision::kNotPlaced: return "it does not fit the map";
   }
   return "?";
 }
@@ -80,6 +81,10 @@ CloudOutcome OcclusionPipeline::add_cloud(Stamp stamp, const PointCloud& cloud, 
   outcome.scan = local_map_.add_scan(cloud, sensor_in_base, base_in_odom, bearing_rad);
   kd_tracer_.reset();
   const ScanReport& scan = outcome.scan;
+  if (!scan.is_placed) {
+    outcome.decision = CloudDecision::kNotPlaced;  // the map is no younger for it
+    return outcome;
+  }
   const bool has_ground = scan.points > scan.not_finite + scan.own_body;
   if (scan.insertion.points == scan.insertion.unusable && !has_ground) {
     outcome.decision = CloudDecision::kEmpty;  // nothing was seen, so the map is no younger for it

@@ -311,6 +311,38 @@ TEST(LocalMap, RefusedAlignmentsKeepTheGuess) {
   EXPECT_TRUE(map.correction().isApprox(Eigen::Isometry3d::Identity()));
 }
 
+TEST(LocalMap, AScanThatIsNotPlacedIsNotInserted) {
+  const auto walls = street();
+  LocalMap map({}, {}, {});
+  map.add_scan(scan_of(walls, kSensor, 1), kSensor, pose(0, 0, 0, 0));
+  const std::size_t size = map.map().size();
+  const auto lost = [&](double x) {  // the odometry is 9 m off to the side
+    return map.add_scan(scan_of(walls, pose(x, 0, 1.5, 0), 2), kSensor, pose(x, 9.0, 0, 0));
+  };
+  for (const double x : {0.0, 0.5, 1.5}) {  // a keyframe, one before the next, and that
+    const ScanReport report = lost(x);
+    EXPECT_FALSE(report.is_placed) << x;
+    EXPECT_EQ(report.insertion.points, 0u);
+    EXPECT_EQ(map.map().size(), size);
+  }
+  const ScanReport found = map.add_scan(scan_of(walls, pose(3, 0, 1.5, 0), 3), kSensor, pose(3, 0, 0, 0));
+  EXPECT_TRUE(found.is_placed) << found.alignment.reason;
+  EXPECT_GT(found.insertion.points, 0u);
+}
+
+TEST(LocalMap, AMapThatCannotBeAlignedGoesOnAfterADistance) {
+  const std::vector<Rectangle> plane = {wall({-40, 8}, {40, 8}, 0, 10)};
+  LocalMapParameters parameters;
+  parameters.unplaced_distance = 3.5;
+  LocalMap map(parameters, {}, {});
+  std::vector<int> placed;
+  for (int k = 0; k <= 10; ++k) {
+    const auto report = map.add_scan(scan_of(plane, pose(k, 0, 1.5, 0), 1), kSensor, pose(k, 0, 0, 0));
+    if (report.is_placed) placed.push_back(k);
+  }
+  EXPECT_EQ(placed, (std::vector<int>{0, 5, 10}));
+}
+
 TEST(LocalMap, ParametersMustBeInOrder) {
   LocalMapParameters parameters;
   parameters.body_radius = 200.0;

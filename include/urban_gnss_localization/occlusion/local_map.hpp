@@ -21,6 +21,7 @@ struct LocalMapParameters {
   double align_radius{60.0};
   double keyframe_distance{1.0};
   double keyframe_angle{0.17};
+  double unplaced_distance{5.0};
 
   void visit(ParameterVisitor& v) {
     v.basic()("body_radius", body_radius, non_negative(), "m",
@@ -32,6 +33,8 @@ struct LocalMapParameters {
       "radius about the sensor of the part of the map that a scan is aligned to");
     v("keyframe_distance", keyframe_distance, positive(), "m", "distance travelled from one alignment to the next");
     v("keyframe_angle", keyframe_angle, positive(), "rad", "angle turned from one alignment to the next");
+    v("unplaced_distance", unplaced_distance, positive(), "m",
+      "distance travelled with scans that do not fit the map, after which one is inserted where the odometry puts it");
   }
   void check(std::vector<std::string>& faults) const;
 };
@@ -43,14 +46,17 @@ struct ScanReport {
   std::size_t own_body{0};  ///< the robot itself
   std::size_t cut{0};       ///< robot, ground and beyond the range
   bool is_keyframe{false};
-  Alignment alignment;  ///< kNotTried between keyframes, and where the map is still empty
+  bool is_placed{true};  ///< otherwise nothing of it was inserted
+  Alignment alignment;   ///< kNotTried between keyframes, and where the map is still empty
   InsertReport insertion;
   Eigen::Isometry3d base_in_map{Eigen::Isometry3d::Identity()};  ///< with which it was inserted
 };
 
 /// Builds the map of the surroundings from scans (Maier & Kleiner 2010, section IV.A and eq. 5): cut, align at
-/// keyframes, insert. A correction that the alignment finds stays in force until the next one; if an alignment is not
-/// accepted, the scan is inserted with the guess and the last correction, and the report says so.
+/// keyframes, insert. A correction that the alignment finds stays in force until the next one. If an alignment is not
+/// accepted, neither that scan nor those up to the next keyframe are inserted, and the report says so; after
+/// unplaced_distance one is, with the guess and the last correction, so that the map goes on where it cannot be
+/// aligned.
 ///
 /// Where an IMU tells the bearing, the guess turns as the bearing does and not as the odometry (section V: "odometry
 /// and IMU bearing as an initial guess"). A constant error of the bearing has no effect. Where both turn so differently
@@ -80,6 +86,8 @@ class LocalMap {
   bool is_keyframe(const Eigen::Isometry3d& base_in_map) const;
   /// Turns the correction by what the bearing has turned more than the odometry since the last scan.
   void follow(std::optional<double> bearing_rad, const Eigen::Isometry3d& base_in_map);
+  /// Notes whether scans from this keyframe on have a place in the map.
+  void note_placement(const Alignment& alignment, const Eigen::Isometry3d& base_in_map);
 
   LocalMapParameters parameters_;
   ScanAlignerParameters aligner_parameters_;
@@ -88,6 +96,8 @@ class LocalMap {
   Eigen::Isometry3d last_keyframe_{Eigen::Isometry3d::Identity()};
   bool has_keyframe_{false};
   std::optional<double> odometry_from_bearing_rad_;  ///< the odometry's yaw minus the bearing, at the last scan
+  bool is_placed_{true};
+  double unplaced_m_{0.0};  ///< travelled since the first keyframe that was not
 };
 
 }  // namespace urban_gnss

@@ -108,7 +108,7 @@ struct WorldAlignment {
 };
 
 /// Why a cloud did not go into the map.
-enum class CloudDecision { kInserted, kNotNewer, kEmpty, kNotFinite };
+enum class CloudDecision { kInserted, kNotNewer, kEmpty, kNotFinite, kNotPlaced };
 const char* to_string(CloudDecision decision);
 
 struct CloudOutcome {
