@@ -1,0 +1,61 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "urban_gnss_localization/occlusion/map_file.hpp"
+
+namespace urban_gnss {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+struct MapFile : testing::Test {
+  fs::path folder{fs::temp_directory_path() / ("map_file_" + std::to_string(::getpid()))};
+  PointCloud map{{1.0F, 2.0F, 3.0F}, {4.0F, 5.0F, 6.0F}};
+
+  MapFile() { fs::create_directory(folder); }
+  ~MapFile() override { fs::remove_all(folder); }
+  std::string in(const std::string& name) const { return (folder / name).string(); }
+  std::size_t files() const {
+    return static_cast<std::size_t>(std::distance(fs::directory_iterator(folder), fs::directory_iterator()));
+  }
+};
+
+TEST_F(MapFile, IsWrittenAndNotOverwrittenUnlessThatIsWanted) {
+  save_map_file(in("a.pcd"), map, false);
+  EXPECT_EQ(read_pcd(in("a.pcd")).size(), 2u);
+  map.push_back({7.0F, 8.0F, 9.0F});
+  EXPECT_THROW(save_map_file(in("a.pcd"), map, false), std::runtime_error);
+  EXPECT_EQ(read_pcd(in("a.pcd")).size(), 2u);
+  save_map_file(in("a.pcd"), map, true);
+  EXPECT_EQ(read_pcd(in("a.pcd")).size(), 3u);
+  EXPECT_EQ(files(), 1u) << "no remains";
+}
+
+TEST_F(MapFile, OtherPathsAreRefused) {
+  EXPECT_THAT(map_file_fault("map.pcd", false), HasSubstr("absolute"));
+  EXPECT_THAT(map_file_fault("../map.pcd", false), HasSubstr("absolute"));
+  EXPECT_THAT(map_file_fault("", false), HasSubstr("absolute"));
+  EXPECT_THAT(map_file_fault(in("map.bag"), false), HasSubstr("must end in .pcd"));
+  EXPECT_THAT(map_file_fault(in(".pcd"), false), HasSubstr("must end in .pcd"));
+  EXPECT_THAT(map_file_fault("/etc/passwd", true), HasSubstr("must end in .pcd"));
+  EXPECT_THAT(map_file_fault(in("a\nb.pcd"), false), HasSubstr("control characters"));
+  EXPECT_THAT(map_file_fault(in("a") + std::string("\0.pcd", 5), false), HasSubstr("control characters"));
+  EXPECT_THAT(map_file_fault(in("no/a.pcd"), false), HasSubstr("no such folder"));
+  EXPECT_THAT(map_file_fault("/" + std::string(5000, 'a') + ".pcd", false), HasSubstr("4095"));
+  fs::create_directory(in("folder.pcd"));
+  EXPECT_THAT(map_file_fault(in("folder.pcd"), true), HasSubstr("no ordinary file"));
+  std::ofstream(in("other.txt")) << "precious";
+  fs::create_symlink(in("other.txt"), in("link.pcd"));
+  EXPECT_THAT(map_file_fault(in("link.pcd"), true), HasSubstr("no ordinary file"));
+  EXPECT_EQ(fs::file_size(in("other.txt")), 8u);
+  EXPECT_THROW(save_map_file(in("b.pcd"), {}, false), std::runtime_error);
+  EXPECT_FALSE(fs::exists(in("b.pcd")));
+}
+
+}  // namespace
+}  // namespace urban_gnss
