@@ -13,6 +13,7 @@
 #include "urban_gnss_localization/ros/conversions.hpp"
 #include "urban_gnss_localization/ros/error_plot.hpp"
 #include "urban_gnss_localization/ros/node_parameters.hpp"
+#include "urban_gnss_localization/ros/node_shell.hpp"
 #include "urban_gnss_localization/ros/topics.hpp"
 
 using namespace urban_gnss;
@@ -39,16 +40,14 @@ class ComparisonNode {
         names_(words(parameters_.localizers)),
         history_(names_.size(), from_seconds(parameters_.window), kInterval) {
     publisher_ = node.advertise<sensor_msgs::Image>(topics::kErrorPlot, 2);
-    subscribers_.push_back(node.subscribe<nav_msgs::Odometry>(
-        topics::kTruth, 1000,
-        [this](const nav_msgs::OdometryConstPtr& message) { history_.add_truth(to_timed_pose(*message)); }));
+    subscribers_.push_back(io_.subscribe<nav_msgs::Odometry>(
+        node, topics::kTruth, 1000, [this](const auto& message) { history_.add_truth(to_timed_pose(*message)); }));
     for (std::size_t i = 0; i < names_.size(); ++i) {
-      subscribers_.push_back(node.subscribe<nav_msgs::Odometry>(
-          names_[i] + "/" + topics::kEstimate, 1000,
-          [this, i](const nav_msgs::OdometryConstPtr& message) { history_.add_estimate(i, to_timed_pose(*message)); }));
+      subscribers_.push_back(io_.subscribe<nav_msgs::Odometry>(
+          node, names_[i] + "/" + topics::kEstimate, 1000,
+          [this, i](const auto& message) { history_.add_estimate(i, to_timed_pose(*message)); }));
     }
-    timer_ = node.createWallTimer(ros::WallDuration(1.0 / parameters_.plot_rate),
-                                  [this](const ros::WallTimerEvent&) { publish(); });
+    timer_ = io_.every(node, 1.0 / parameters_.plot_rate, "the plot's timer", [this] { publish(); });
   }
 
  private:
@@ -72,6 +71,8 @@ class ComparisonNode {
 
   ComparisonNodeParameters parameters_;
   std::vector<std::string> names_;
+  EventLog log_;
+  NodeShell io_{log_};
   ErrorHistory history_;
   ros::Publisher publisher_;
   std::vector<ros::Subscriber> subscribers_;

@@ -18,8 +18,9 @@ class ComplementaryEkfNode {
       : node_(node, private_node, standard_localizers().find("complementary_ekf")) {
     private_node.setParam("mode", filter().mode());  // the server starts from what is there
     server_ = std::make_unique<Server>(private_node);
-    server_->setCallback([this](Config& config, std::uint32_t) { set_mode(config); });
-    gate_timer_ = node.createWallTimer(ros::WallDuration(60.0), [this](const ros::WallTimerEvent&) { watch_gate(); });
+    server_->setCallback(
+        [this](Config& config, std::uint32_t) { node_.shell().run("dynamic_reconfigure", [&] { set_mode(config); }); });
+    gate_timer_ = node_.shell().every(node, 60.0, "the gate's timer", [this] { watch_gate(); });
   }
 
  private:
@@ -35,7 +36,7 @@ class ComplementaryEkfNode {
       filter().set_mode(mode);
       return;
     }
-    ROS_ERROR_STREAM("mode: there is no '" << config.mode << "'; it stays " << filter().mode());
+    node_.shell().refuse("mode", "there is no '" + config.mode.substr(0, 50) + "'; it stays " + filter().mode());
     config.mode = filter().mode();
   }
 

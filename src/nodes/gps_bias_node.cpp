@@ -14,6 +14,7 @@
 #include "urban_gnss_localization/ros/gps_bias_node_parameters.hpp"
 #include "urban_gnss_localization/ros/markers.hpp"
 #include "urban_gnss_localization/ros/node_parameters.hpp"
+#include "urban_gnss_localization/ros/node_shell.hpp"
 #include "urban_gnss_localization/ros/topics.hpp"
 
 using namespace urban_gnss;
@@ -27,19 +28,27 @@ class GpsBiasNode {
     bias_publisher_ = node.advertise<urban_gnss_localization::GpsBias>(topics::kBias, 100);
     marker_publisher_ = node.advertise<visualization_msgs::MarkerArray>(topics::kBiasMarkers, 2);
     const ros::TransportHints no_delay = ros::TransportHints().tcpNoDelay();
+    using nav_msgs::Odometry;
+    using sensor_msgs::NavSatFix;
+    const auto refuse_fix = [this](const NavSatFix& m, const std::string& why) {
+      pipeline_.refuse_fix(to_stamp(m.header.stamp), why);
+      publish();
+    };
     subscribers_ = {
-        node.subscribe(topics::kDatum, 10, &GpsBiasNode::on_datum, this),
-        node.subscribe(topics::kOdometry, 1000, &GpsBiasNode::on_odometry, this, no_delay),
-        node.subscribe(topics::kEstimate, 1000, &GpsBiasNode::on_estimate, this, no_delay),
-        node.subscribe(topics::kFix, 100, &GpsBiasNode::on_fix, this, no_delay),
+        io_.subscribe_any<NavSatFix>(node, topics::kDatum, 10, [this](const auto& m) { on_datum(*m); }),
+        io_.subscribe<Odometry>(
+            node, topics::kOdometry, 1000, [this](const auto& m) { on_odometry(*m); }, no_delay),
+        io_.subscribe<Odometry>(
+            node, topics::kEstimate, 1000, [this](const auto& m) { on_estimate(*m); }, no_delay),
+        io_.subscribe<NavSatFix>(
+            node, topics::kFix, 100, [this](const auto& m) { on_fix(*m); }, no_delay, refuse_fix),
     };
     diagnostics_.setHardwareID("none");
     diagnostics_.add("gps bias", this, &GpsBiasNode::diagnose);
-    second_timer_ = node.createWallTimer(ros::WallDuration(1.0),
-                                         [this](const ros::WallTimerEvent&) { diagnostics_.force_update(); });
-    five_second_timer_ = node.createWallTimer(ros::WallDuration(5.0), [this](const ros::WallTimerEvent&) {
+    second_timer_ = io_.every(node, 1.0, "the node's timer", [this] { diagnostics_.force_update(); });
+    five_second_timer_ = io_.every(node, 5.0, "the node's timer", [this] {
       const std::string missing = pipeline_.waiting_for();
-      if (!missing.empty()) ROS_WARN_STREAM("waiting for " << missing);
+      if (!missing.empty()) log_.warn("waiting for " + missing);
     });
   }
 
@@ -58,7 +67,7 @@ class GpsBiasNode {
     try {
       pipeline_.set_datum(to_geodetic(message));
     } catch (const std::invalid_argument& error) {
-      ROS_ERROR_STREAM(topics::kDatum << " refused: " << error.what());
+      io_.refuse(topics::kDatum, error.what());
     }
     publish();
   }
@@ -67,6 +76,11 @@ class GpsBiasNode {
     publish();
   }
   void on_estimate(const nav_msgs::Odometry& message) {
+    const std::string fault = message_fault(message.pose);
+    if (!fault.empty()) {
+      io_.refuse(topics::kEstimate, fault);
+      return;
+    }
     pipeline_.add_estimate(to_stamp(message.header.stamp), to_pose2(message.pose.pose));
     publish();
   }
@@ -76,10 +90,10 @@ class GpsBiasNode {
   }
 
   void publish() {
-    log_.log(pipeline_.take_events());
+    io_.report(pipeline_.take_events());
     for (const BiasEstimate& bias : pipeline_.take_estimates()) {
-      bias_publisher_.publish(to_message(bias, frames_.map));
-      if (marker_publisher_.getNumSubscribers() > 0) marker_publisher_.publish(bias_markers(bias, frames_.map));
+      io_.publish(bias_publisher_, to_message(bias, frames_.map));
+      if (marker_publisher_.getNumSubscribers() > 0) io_.publish(marker_publisher_, bias_markers(bias, frames_.map));
       last_ = bias;
     }
   }
@@ -96,11 +110,13 @@ class GpsBiasNode {
     status.add("shadow statistic", last_.shadow_statistic);
     status.add("last fix", to_string(last_.outcome.decision));
     status.add("last NIS", last_.outcome.nis);
+    io_.diagnose(status);
   }
 
   Frames frames_;
   BiasPipeline pipeline_;
   EventLog log_;
+  NodeShell io_{log_};
   BiasEstimate last_;
   ros::Publisher bias_publisher_;
   ros::Publisher marker_publisher_;

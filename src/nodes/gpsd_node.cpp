@@ -6,6 +6,7 @@
 #include <thread>
 
 #include "urban_gnss_localization/ros/conversions.hpp"
+#include "urban_gnss_localization/ros/event_log.hpp"
 #include "urban_gnss_localization/ros/gpsd_node_parameters.hpp"
 #include "urban_gnss_localization/ros/node_parameters.hpp"
 #include "urban_gnss_localization/ros/receiver_publishers.hpp"
@@ -38,21 +39,28 @@ class GpsdNode {
 
   void read_until_stopped() {
     while (!is_stopped_) {
-      if (!lines_.is_open() && !connect()) continue;
-      const auto line = lines_.read_line(parameters_.settle_time);
-      const std::lock_guard<std::mutex> lock(mutex_);
-      if (line) {
-        decoder_.add(*line, to_stamp(ros::Time::now()));
-      } else {
-        decoder_.settle();
+      try {
+        if (lines_.is_open() || connect()) read_next();
+      } catch (const std::exception& error) {  // one line is lost, not the node
+        ROS_ERROR_STREAM("a report of gpsd failed: " << log_line(error.what()));
       }
-      publish(decoder_.take());
-      if (!lines_.is_open()) {
-        is_connected_ = false;
-        decoder_.reset();
-        ROS_WARN_STREAM("gpsd at " << server() << " has ended the connection; trying again every "
-                                   << parameters_.reconnect_period << " s");
-      }
+    }
+  }
+
+  void read_next() {
+    const auto line = lines_.read_line(parameters_.settle_time);
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (line) {
+      decoder_.add(*line, to_stamp(ros::Time::now()));
+    } else {
+      decoder_.settle();
+    }
+    publish(decoder_.take());
+    if (!lines_.is_open()) {
+      is_connected_ = false;
+      decoder_.reset();
+      ROS_WARN_STREAM("gpsd at " << server() << " has ended the connection; trying again every "
+                                 << parameters_.reconnect_period << " s");
     }
   }
 

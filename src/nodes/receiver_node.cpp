@@ -8,6 +8,7 @@
 #include "urban_gnss_localization/receivers/receiver_input.hpp"
 #include "urban_gnss_localization/ros/conversions.hpp"
 #include "urban_gnss_localization/ros/node_parameters.hpp"
+#include "urban_gnss_localization/ros/node_shell.hpp"
 #include "urban_gnss_localization/ros/receiver_messages.hpp"
 #include "urban_gnss_localization/ros/receiver_node_parameters.hpp"
 #include "urban_gnss_localization/ros/receiver_publishers.hpp"
@@ -43,7 +44,7 @@ class ReceiverNode {
     const std::string fault = why_not_a_receiver(name);
     if (!fault.empty()) throw std::runtime_error(fault);
     const boost::function<void(const ShapeEvent&)> callback = [this, name, &topic](const ShapeEvent& event) {
-      on_message(name, topic, event);
+      io_.run(name, [&] { on_message(name, topic, event); });
     };
     subscribers_.push_back(
         node.subscribe<ShapeShifter>(name, 1000, callback, ros::VoidConstPtr(), ros::TransportHints().tcpNoDelay()));
@@ -97,11 +98,14 @@ class ReceiverNode {
     add_counts(counts, status);
     for (const auto& [topic, count] : input_.received()) status.add("messages on " + topic, count);
     for (const auto& [topic, count] : input_.unreadable()) status.add("unreadable messages on " + topic, count);
+    io_.diagnose(status);
   }
 
   const ReceiverNodeParameters parameters_;
   const ReceiverPreset& preset_;
   ReceiverInput input_;
+  EventLog log_;
+  NodeShell io_{log_};
   ReceiverPublishers publishers_;
   std::vector<ros::Subscriber> subscribers_;
   diagnostic_updater::Updater diagnostics_;

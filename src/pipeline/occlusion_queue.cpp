@@ -30,11 +30,21 @@ OcclusionQueue::OcclusionQueue(const OcclusionPipelineParameters& pipeline, cons
       transforms_(transforms),
       pipeline_(pipeline),
       antenna_known_(pipeline.occlusion.antenna_offset != std::vector<double>{0.0, 0.0, 0.0}),
-      fix_stamps_(parameters.time_jump) {}
+      fix_stamps_(parameters.time_jump),
+      cloud_stamps_(parameters.time_jump) {}
 
 void OcclusionQueue::add_cloud(QueuedCloud cloud) {
-  clouds_.push_back(std::move(cloud));
   ++tally_.clouds;
+  if (cloud.stamp == Stamp(0)) {
+    leave_out(cloud, "header.stamp is 0", "its driver must set it");
+    return;
+  }
+  const auto last = cloud_stamps_.last();
+  if (cloud_stamps_.judge(cloud.stamp) == StampVerdict::kOdd) {
+    leave_out(cloud, "its stamp is odd", describe_oddness(cloud.stamp, *last));
+    return;
+  }
+  clouds_.push_back(std::move(cloud));
   while (clouds_.size() > static_cast<std::size_t>(parameters_.cloud_queue)) {
     const QueuedCloud oldest = std::move(clouds_.front());
     clouds_.pop_front();
@@ -64,21 +74,39 @@ void OcclusionQueue::add_imu(const ImuSample& sample, const std::string& frame) 
 }
 
 void OcclusionQueue::add_fix(QueuedFix fix) {
-  const bool is_newer = fix_stamps_.accept(fix.stamp, [&](Stamp back) {
-    std::ostringstream text;
-    text << "the clock was set back by " << to_seconds(back) << " s: started anew";
-    say(Level::kWarn, "clock", fix.stamp, text.str());
-    start_anew();
-    return true;
-  });
-  if (!is_newer) {
+  const auto last = fix_stamps_.last();
+  const StampVerdict verdict = fix_stamps_.judge(fix.stamp);
+  if (verdict == StampVerdict::kNotNewer) {
     ++tally_.fixes_left_out;
     say(Level::kWarn, "order", fix.stamp, "a fix is not newer than the one before it; left out");
     return;
   }
+  if (verdict == StampVerdict::kOdd) {
+    say(Level::kWarn, "odd", *last, "fix held back: " + describe_oddness(fix.stamp, *last));
+    if (fix_stamps_.run() == 1) tally_.fixes_left_out += std::exchange(odd_fixes_, {}).size();
+    odd_fixes_.push_back(std::move(fix));
+    return;
+  }
+  std::vector<QueuedFix> held = std::exchange(odd_fixes_, {});
+  if (verdict == StampVerdict::kWentBack) {
+    std::ostringstream text;
+    text << "the clock was set back by " << to_seconds(*last - fix.stamp) << " s: started anew";
+    say(Level::kWarn, "clock", fix.stamp, text.str());
+    start_anew();
+  }
+  // Those that the stream goes on from, or that it has come up to, were not odd.
+  for (QueuedFix& each : held) {
+    const bool belongs = each.stamp < fix.stamp && (verdict == StampVerdict::kWentBack || each.stamp > *last);
+    if (belongs) keep(std::move(each));
+    if (!belongs) ++tally_.fixes_left_out;
+  }
+  keep(std::move(fix));
+  forget_former_clock();
+}
+
+void OcclusionQueue::keep(QueuedFix fix) {
   newest_ = std::max(newest_, fix.stamp);
   fixes_.push_back(std::move(fix));
-  forget_former_clock();
 }
 
 void OcclusionQueue::set_yaw_variance(double variance) {
@@ -109,6 +137,7 @@ void OcclusionQueue::start_anew() {
   pipeline_.reset();
   prior_is_in_ = false;
   clouds_.clear();
+  cloud_stamps_.reset();
   fixes_.clear();
   transforms_.forget();
   newest_ = next_mounting_ = Stamp(0);
@@ -159,6 +188,7 @@ bool OcclusionQueue::insert(const QueuedCloud& cloud) {
   }
   try {
     const CloudOutcome outcome = pipeline_.add_cloud(cloud.stamp, cloud.read(), *sensor, *base);
+    note_alignment(cloud, outcome.scan);
     if (outcome.decision == CloudDecision::kInserted) {
       note(cloud, outcome.scan);
     } else {
@@ -182,6 +212,9 @@ void OcclusionQueue::note(const QueuedCloud& cloud, const ScanReport& scan) {
         "max_voxels is too small for the window: " + std::to_string(scan.insertion.dropped_by_limit) +
             " voxels dropped");
   }
+}
+
+void OcclusionQueue::note_alignment(const QueuedCloud& cloud, const ScanReport& scan) {
   const Alignment& alignment = scan.alignment;
   if (!scan.is_keyframe || alignment.decision == AlignmentDecision::kNotTried) return;
   ++tally_.alignments_tried;
@@ -189,7 +222,7 @@ void OcclusionQueue::note(const QueuedCloud& cloud, const ScanReport& scan) {
   if (alignment.is_accepted()) {
     ++tally_.alignments_accepted;
   } else {
-    say(Level::kInfo, "alignment", cloud.stamp, "scan not aligned, odometry used: " + alignment.reason);
+    say(Level::kInfo, "alignment", cloud.stamp, "scan not aligned: " + alignment.reason);
   }
 }
 

@@ -1,13 +1,17 @@
 #include "urban_gnss_localization/ros/input_watch.hpp"
 
-#include <ros/console.h>
-
 namespace urban_gnss {
+namespace {
+
+constexpr std::size_t kLongestName = 50;  ///< that is written
+
+}  // namespace
 
 void InputWatch::observe_frame(const std::string& frame) {
   if (has_frame_ && frame != frame_) {
-    ROS_WARN_STREAM(topic() << ": frame_id changed from '" << frame_ << "' to '" << frame
-                            << "'; are two sources publishing?");
+    const auto name = [](const std::string& id) { return "'" + id.substr(0, kLongestName) + "'"; };
+    log_.warn(topic() + ": frame_id changed from " + name(frame_) + " to " + name(frame) +
+              "; are two sources publishing?");
   }
   frame_ = frame;
   has_frame_ = true;
@@ -16,7 +20,7 @@ void InputWatch::observe_frame(const std::string& frame) {
 void InputWatch::check_publishers() {
   const std::uint32_t count = publishers();
   if (count > 1 && !warned_of_publishers_) {
-    ROS_WARN_STREAM(topic() << ": " << count << " publishers; fixes and odometry of two sources do not mix");
+    log_.warn(topic() + ": " + std::to_string(count) + " publishers; fixes and odometry of two sources do not mix");
   }
   warned_of_publishers_ = count > 1;
 }

@@ -29,49 +29,77 @@ LocalizerNode::LocalizerNode(ros::NodeHandle& node, ros::NodeHandle& private_nod
   status_publisher_ = private_node.advertise<urban_gnss_localization::LocalizationStatus>(topics::kStatus, 100);
   datum_publisher_ = node.advertise<sensor_msgs::NavSatFix>(topics::kDatum, 1, true);
 
-  using Self = LocalizerNode;
+  tf_.emplace(node, io_);
+  subscribe(node);
+  serve(node, private_node);
+  diagnostics_.setHardwareID("none");
+  diagnostics_.add("localization", this, &LocalizerNode::diagnose);
+  second_timer_ = io_.every(node, 1.0, "the node's timer", [this] { every_second(); });
+  five_second_timer_ = io_.every(node, 5.0, "the node's timer", [this] { every_five_seconds(); });
+  publish_results();
+}
+
+void LocalizerNode::subscribe(ros::NodeHandle& node) {
+  using sensor_msgs::Imu;
+  using sensor_msgs::NavSatFix;
+  using urban_gnss_localization::GpsBias;
+  using urban_gnss_localization::SatelliteArray;
+  const auto add = [this](const ros::Subscriber& subscriber) { subscribers_.push_back(subscriber); };
   // First, so that a datum that is latched comes before fixes of which another would be made.
-  subscribers_.push_back(node.subscribe(topics::kDatum, 10, &Self::on_datum, this));
-  subscribers_.push_back(node.subscribe(topics::kOdometry, 1000, &Self::on_odometry, this, kNoDelay));
+  add(io_.subscribe_any<NavSatFix>(node, topics::kDatum, 10, [this](const auto& m) { on_datum(*m); }));
+  add(io_.subscribe<nav_msgs::Odometry>(
+      node, topics::kOdometry, 1000, [this](const auto& m) { on_odometry(*m); }, kNoDelay));
   odometry_watch_.set_subscriber(subscribers_.back());
-  subscribers_.push_back(node.subscribe(topics::kFix, 100, &Self::on_fix, this, kNoDelay));
+  add(io_.subscribe<NavSatFix>(
+      node, topics::kFix, 100, [this](const auto& m) { on_fix(*m); }, kNoDelay,
+      [this](const NavSatFix& m, const std::string& why) {
+        pipeline_.refuse_fix(to_stamp(m.header.stamp), why);
+        publish_results();
+      }));
   fix_watch_.set_subscriber(subscribers_.back());
-  subscribers_.push_back(node.subscribe(topics::kInitialPose, 10, &Self::on_initial_pose, this));
+  add(io_.subscribe_any<geometry_msgs::PoseWithCovarianceStamped>(node, topics::kInitialPose, 10,
+                                                                  [this](const auto& m) { on_initial_pose(*m); }));
   if (pipeline_.localizer().wants_bias()) {
-    subscribers_.push_back(node.subscribe(topics::kBias, 100, &Self::on_bias, this, kNoDelay));
+    add(io_.subscribe<GpsBias>(
+        node, topics::kBias, 100, [this](const auto& m) { on_bias(*m); }, kNoDelay));
   }
   if (pipeline_.takes_velocity()) {
-    subscribers_.push_back(node.subscribe(topics::kVelocity, 100, &Self::on_velocity, this, kNoDelay));
+    add(io_.subscribe_any<topic_tools::ShapeShifter>(
+        node, topics::kVelocity, 100, [this](const auto& m) { on_velocity(*m); }, kNoDelay));
   }
-  subscribers_.push_back(node.subscribe(topics::kSatellites, 100, &Self::on_satellites, this, kNoDelay));
+  add(io_.subscribe<SatelliteArray>(
+      node, topics::kSatellites, 100, [this](const auto& m) { on_satellites(*m); }, kNoDelay));
   if (parameters_.localization.imu.use_imu_yaw_rate ||
       (pipeline_.localizer().takes_heading() &&
        parameters_.localization.imu_orientation.imu_heading != ImuHeadingUse::kNone)) {
-    subscribers_.push_back(node.subscribe(topics::kImu, 1000, &Self::on_imu, this, kNoDelay));
+    add(io_.subscribe<Imu>(
+        node, topics::kImu, 1000, [this](const auto& m) { on_imu(*m); }, kNoDelay));
   }
-  services_.push_back(node.advertiseService("set_pose", &Self::set_pose, this));
-  services_.push_back(node.advertiseService("datum", &Self::set_datum, this));
-  using namespace urban_gnss_localization;
-  services_.push_back(node.advertiseService("toLL", &Self::convert<ToLL::Request, ToLL::Response>, this));
-  services_.push_back(node.advertiseService("fromLL", &Self::convert<FromLL::Request, FromLL::Response>, this));
-  services_.push_back(
-      node.advertiseService("toLLArray", &Self::convert<ToLLArray::Request, ToLLArray::Response>, this));
-  services_.push_back(
-      node.advertiseService("fromLLArray", &Self::convert<FromLLArray::Request, FromLLArray::Response>, this));
-  services_.push_back(private_node.advertiseService("reset", &Self::reset, this));
+}
 
-  diagnostics_.setHardwareID("none");
-  diagnostics_.add("localization", this, &Self::diagnose);
-  second_timer_ = node.createWallTimer(ros::WallDuration(1.0), [this](const ros::WallTimerEvent&) { every_second(); });
-  five_second_timer_ =
-      node.createWallTimer(ros::WallDuration(5.0), [this](const ros::WallTimerEvent&) { every_five_seconds(); });
-  publish_results();
+void LocalizerNode::serve(ros::NodeHandle& node, ros::NodeHandle& private_node) {
+  using namespace urban_gnss_localization;
+  services_.push_back(
+      io_.serve<SetPose::Request, SetPose::Response>(node, "set_pose", [this](auto& request, auto& response) {
+        response.message = try_pose(request.pose);
+        response.success = response.message.empty();
+      }));
+  services_.push_back(io_.serve<SetDatum::Request, SetDatum::Response>(
+      node, "datum", [this](auto& request, auto& response) { set_datum(request, response); }));
+  serve_conversion<ToLL>(node, "toLL");
+  serve_conversion<FromLL>(node, "fromLL");
+  serve_conversion<ToLLArray>(node, "toLLArray");
+  serve_conversion<FromLLArray>(node, "fromLLArray");
+  services_.push_back(
+      io_.serve<std_srvs::Empty::Request, std_srvs::Empty::Response>(private_node, "reset", [this](auto&, auto&) {
+        pipeline_.reset("requested");
+        publish_results();
+      }));
 }
 
 void LocalizerNode::on_odometry(const nav_msgs::Odometry& message) {
   odometry_watch_.observe_frame(message.header.frame_id);
   sensor_frames_.observe_odometry(message.header.frame_id, message.child_frame_id);
-  newest_input_ = to_stamp(message.header.stamp);
   pipeline_.add_odometry(to_odometry_sample(message));
   publish_results();
 }
@@ -87,10 +115,10 @@ void LocalizerNode::on_fix(const sensor_msgs::NavSatFix& message) {
 void LocalizerNode::on_velocity(const topic_tools::ShapeShifter& message) {
   const auto velocity = to_raw_velocity_of(message);
   if (!velocity) {
-    ROS_ERROR_STREAM_THROTTLE(
-        5.0, topics::kVelocity << " left out: is " << message.getDataType() << ", must be " << kVelocityTypes);
+    io_.refuse(topics::kVelocity, "is " + message.getDataType() + ", must be " + kVelocityTypes);
     return;
   }
+  if (!io_.stamp_fault(topics::kVelocity, to_ros(velocity->stamp)).empty()) return;
   pipeline_.add_velocity(*velocity);
   publish_results();
 }
@@ -103,12 +131,17 @@ void LocalizerNode::on_satellites(const urban_gnss_localization::SatelliteArray&
 void LocalizerNode::on_imu(const sensor_msgs::Imu& message) {
   sensor_frames_.observe_imu(message.header.frame_id);
   look_up_sensors();
-  if (const auto sample = to_imu_sample(message)) pipeline_.add_imu(*sample);
+  if (const auto sample = to_imu_sample(message)) {
+    pipeline_.add_imu(*sample);
+  } else if (message.angular_velocity_covariance[0] != -1.0) {
+    io_.refuse(topics::kImu, "angular_velocity is not finite");
+  }
 }
 
 void LocalizerNode::on_bias(const urban_gnss_localization::GpsBias& message) {
-  if (!std::isfinite(message.radius) || message.radius < 0.0) {
-    ROS_WARN_STREAM_THROTTLE(5.0, "gps/bias left out: radius is not a finite length");
+  const std::string fault = message_fault(message);
+  if (!fault.empty()) {
+    io_.refuse(topics::kBias, fault);
     return;
   }
   pipeline_.add_bias(to_bias_estimate(message));
@@ -120,6 +153,8 @@ std::string LocalizerNode::try_pose(const geometry_msgs::PoseWithCovarianceStamp
   if (!frame.empty() && frame != parameters_.frames.map) {
     return "pose is in frame '" + message.header.frame_id + "', must be in '" + parameters_.frames.map + "'";
   }
+  const std::string fault = message_fault(message.pose);
+  if (!fault.empty()) return fault;
   try {
     pipeline_.set_pose(to_pose_estimate(message.pose));
   } catch (const std::invalid_argument& error) {
@@ -132,14 +167,7 @@ std::string LocalizerNode::try_pose(const geometry_msgs::PoseWithCovarianceStamp
 
 void LocalizerNode::on_initial_pose(const geometry_msgs::PoseWithCovarianceStamped& message) {
   const std::string fault = try_pose(message);
-  if (!fault.empty()) ROS_ERROR_STREAM("initialpose refused: " << fault);
-}
-
-bool LocalizerNode::set_pose(urban_gnss_localization::SetPose::Request& request,
-                             urban_gnss_localization::SetPose::Response& response) {
-  response.message = try_pose(request.pose);
-  response.success = response.message.empty();
-  return true;
+  if (!fault.empty()) io_.refuse(topics::kInitialPose, fault);
 }
 
 void LocalizerNode::on_datum(const sensor_msgs::NavSatFix& message) {
@@ -147,7 +175,7 @@ void LocalizerNode::on_datum(const sensor_msgs::NavSatFix& message) {
   if (pipeline_.frame()) {
     const GeodeticPosition& known = pipeline_.frame()->datum();
     if (datum.latitude_deg != known.latitude_deg || datum.longitude_deg != known.longitude_deg) {
-      ROS_WARN_STREAM_THROTTLE(5.0, topics::kDatum << ": left out, there is a datum already; use the service datum");
+      io_.refuse(topics::kDatum, "there is a datum already; use the service datum");
     }
     return;
   }
@@ -155,12 +183,12 @@ void LocalizerNode::on_datum(const sensor_msgs::NavSatFix& message) {
     pipeline_.set_datum(datum);
     published_datum_ = datum;  // it came from the topic: no echo
   } catch (const std::invalid_argument& error) {
-    ROS_ERROR_STREAM(topics::kDatum << " refused: " << error.what());
+    io_.refuse(topics::kDatum, error.what());
   }
   publish_results();
 }
 
-bool LocalizerNode::set_datum(urban_gnss_localization::SetDatum::Request& request,
+void LocalizerNode::set_datum(const urban_gnss_localization::SetDatum::Request& request,
                               urban_gnss_localization::SetDatum::Response& response) {
   try {
     pipeline_.set_datum({request.latitude, request.longitude, request.altitude});
@@ -170,36 +198,31 @@ bool LocalizerNode::set_datum(urban_gnss_localization::SetDatum::Request& reques
     response.message = error.what();
   }
   publish_results();
-  return true;
-}
-
-bool LocalizerNode::reset(std_srvs::Empty::Request&, std_srvs::Empty::Response&) {
-  pipeline_.reset("requested");
-  publish_results();
-  return true;
 }
 
 void LocalizerNode::publish_results() {
-  log_.log(pipeline_.take_events());
+  io_.report(pipeline_.take_events());
   publish_datum();
-  for (const LocalizationOutput& output : pipeline_.take_outputs()) {
-    ++outputs_;
-    estimate_publisher_.publish(to_message(output, parameters_.frames));
-    fix_publisher_.publish(to_fix_message(output, *pipeline_.frame(), parameters_.frames));
-    if (parameters_.publish_tf) {
-      broadcaster_.sendTransform(to_map_to_odom(output, parameters_.frames, parameters_.transform_time_offset));
-    }
-    if (on_output_) on_output_(output);
-  }
+  for (const LocalizationOutput& output : pipeline_.take_outputs()) publish_output(output);
   const std::vector<FixOutcome> outcomes = pipeline_.take_outcomes();
   for (const FixOutcome& outcome : outcomes) {
     if (is_rejected(outcome.decision)) {
-      ROS_WARN_STREAM_THROTTLE(5.0, "fix " << to_string(outcome.decision) << ": " << outcome.reason);
+      log_.warn(std::string("fix ") + to_string(outcome.decision) + ": " + outcome.reason);
     }
   }
-  for (const auto& status : to_status_messages(pipeline_, outcomes, to_ros(newest_input_), parameters_.frames.map)) {
+  for (const auto& status : to_status_messages(pipeline_, outcomes, now(), parameters_.frames.map)) {
     status_publisher_.publish(status);
   }
+}
+
+void LocalizerNode::publish_output(const LocalizationOutput& output) {
+  const auto& frames = parameters_.frames;
+  if (!io_.publish(estimate_publisher_, to_message(output, frames))) return;
+  ++outputs_;
+  io_.publish(fix_publisher_, to_fix_message(output, *pipeline_.frame(), frames));
+  const auto map_to_odom = to_map_to_odom(output, frames, parameters_.transform_time_offset);
+  if (parameters_.publish_tf && io_.lets_out("/tf", map_to_odom)) broadcaster_.sendTransform(map_to_odom);
+  if (on_output_) on_output_(output);
 }
 
 void LocalizerNode::publish_datum() {
@@ -209,17 +232,16 @@ void LocalizerNode::publish_datum() {
   }
   const GeodeticPosition& datum = pipeline_.frame()->datum();
   if (published_datum_ == datum) return;
-  datum_publisher_.publish(to_message(datum, to_ros(newest_input_), parameters_.frames.map));
+  datum_publisher_.publish(to_message(datum, now(), parameters_.frames.map));
   published_datum_ = datum;
 }
 
 void LocalizerNode::publish_status() {
-  status_publisher_.publish(
-      to_message(pipeline_.report(), pipeline_.localizer(), to_ros(newest_input_), parameters_.frames.map));
+  status_publisher_.publish(to_message(pipeline_.report(), pipeline_.localizer(), now(), parameters_.frames.map));
 }
 
 void LocalizerNode::look_up_sensors() {
-  if (!sensor_frames_.is_complete()) sensor_frames_.look_up(tf_buffer_, pipeline_);
+  if (!sensor_frames_.is_complete()) sensor_frames_.look_up(tf_->buffer(), pipeline_);
   log_.log(sensor_frames_.take_events());
 }
 
@@ -235,8 +257,9 @@ void LocalizerNode::every_five_seconds() {
   fix_watch_.check_publishers();
   const std::string missing = pipeline_.waiting_for();
   if (missing.empty()) return;
-  ROS_WARN_STREAM("waiting for " << missing << " (" << odometry_watch_.topic() << ": " << odometry_watch_.publishers()
-                                 << " publishers, " << fix_watch_.topic() << ": " << fix_watch_.publishers() << ")");
+  log_.warn("waiting for " + missing + " (" + odometry_watch_.topic() + ": " +
+            std::to_string(odometry_watch_.publishers()) + " publishers, " + fix_watch_.topic() + ": " +
+            std::to_string(fix_watch_.publishers()) + ")");
 }
 
 void LocalizerNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
@@ -263,6 +286,9 @@ void LocalizerNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status
   status.add("effective sample size", report.health.effective_sample_size);
   status.add("cluster mass", report.health.cluster_mass);
   status.add("estimates published", outputs_);
+  status.add("odd stamps left out", pipeline_.odd_stamps());
+  status.add("broken states", pipeline_.broken_states());
+  io_.diagnose(status);
 }
 
 }  // namespace urban_gnss

@@ -19,7 +19,7 @@ ParticlePublisher::ParticlePublisher(ros::NodeHandle& node, const ParticlePublis
       poses_(node.advertise<geometry_msgs::PoseArray>(topics::kParticles, 2)),
       cloud_(node.advertise<sensor_msgs::PointCloud2>(topics::kWeightedParticles, 2)) {}
 
-void ParticlePublisher::publish(const LocalizationPipeline& pipeline, Stamp stamp) {
+void ParticlePublisher::publish(const LocalizationPipeline& pipeline, Stamp stamp, NodeShell& shell) {
   const bool went_back = stamp < last_;
   if (parameters_.particle_cloud_rate <= 0.0 ||
       (!went_back && to_seconds(stamp - last_) < 1.0 / parameters_.particle_cloud_rate)) {
@@ -28,8 +28,8 @@ void ParticlePublisher::publish(const LocalizationPipeline& pipeline, Stamp stam
   last_ = stamp;
   const ros::Time time = to_ros(stamp);
   const ParticleSet& particles = dynamic_cast<const ParticleLocalizer&>(pipeline.localizer()).particles();
-  if (poses_.getNumSubscribers() > 0) poses_.publish(to_pose_array(particles, time, frame_));
-  if (cloud_.getNumSubscribers() > 0) cloud_.publish(to_point_cloud(particles, time, frame_));
+  if (poses_.getNumSubscribers() > 0) shell.publish(poses_, to_pose_array(particles, time, frame_));
+  if (cloud_.getNumSubscribers() > 0) shell.publish(cloud_, to_point_cloud(particles, time, frame_));
 }
 
 BiasPublisher::BiasPublisher(ros::NodeHandle& node, std::string frame)
@@ -37,10 +37,10 @@ BiasPublisher::BiasPublisher(ros::NodeHandle& node, std::string frame)
       biases_(node.advertise<urban_gnss_localization::GpsBias>(topics::kBias, 100)),
       markers_(node.advertise<visualization_msgs::MarkerArray>(topics::kBiasMarkers, 2)) {}
 
-void BiasPublisher::publish(LocalizationPipeline& pipeline) {
+void BiasPublisher::publish(LocalizationPipeline& pipeline, NodeShell& shell) {
   for (const BiasEstimate& bias : pipeline.take_bias_estimates()) {
-    biases_.publish(to_message(bias, frame_));
-    if (markers_.getNumSubscribers() > 0) markers_.publish(bias_markers(bias, frame_));
+    shell.publish(biases_, to_message(bias, frame_));
+    if (markers_.getNumSubscribers() > 0) shell.publish(markers_, bias_markers(bias, frame_));
   }
 }
 

@@ -1,7 +1,8 @@
 #include "urban_gnss_localization/ros/map_services.hpp"
 
-#include <cmath>
 #include <sstream>
+#include <string>
+#include <vector>
 
 namespace urban_gnss {
 namespace {
@@ -19,6 +20,30 @@ geometry_msgs::Point to_point(const Eigen::Vector3d& position) {
 }
 
 Eigen::Vector3d to_vector(const geometry_msgs::Point& point) { return {point.x, point.y, point.z}; }
+
+/// Of a point from which a robot's place can come, as an odometry's.
+constexpr double kMaxCoordinate_m = 1e7;
+
+std::string joined(const std::vector<std::string>& faults) {
+  std::string text;
+  for (const std::string& fault : faults) text += (text.empty() ? "" : "; ") + fault;
+  return text;
+}
+
+/// The place, or why there is none: in `fault`.
+GeodeticPosition place_of(const geometry_msgs::Point& point, const LocalFrame& map, std::string& fault) {
+  const Eigen::Vector3d position = to_vector(point);
+  if (!(position.cwiseAbs().maxCoeff() <= kMaxCoordinate_m) || !position.allFinite()) {
+    std::ostringstream out;
+    out << "map_point = " << position.transpose() << ": must be finite, and within 10 000 km";
+    fault = out.str();
+    return {};
+  }
+  const GeodeticPosition place = map.to_geodetic(position);
+  fault = joined(position_faults(place));
+  if (!fault.empty()) fault = "map_point is not near the ground: " + fault;
+  return place;
+}
 
 std::string element(std::size_t index) { return "element " + std::to_string(index) + ": "; }
 
@@ -42,10 +67,10 @@ srv::FromLL::Response answer(const srv::FromLL::Request& request, const MapFrame
     response.message = kNoDatum;
     return response;
   }
-  const Eigen::Vector3d point = map->to_local({request.latitude, request.longitude, request.altitude});
-  response.success = point.allFinite();
-  if (!response.success) response.message = "there is no such place";
-  response.map_point = to_point(point);
+  const GeodeticPosition place{request.latitude, request.longitude, request.altitude};
+  response.message = joined(position_faults(place));
+  response.success = response.message.empty();
+  if (response.success) response.map_point = to_point(map->to_local(place));
   return response;
 }
 
@@ -56,9 +81,9 @@ srv::ToLL::Response answer(const srv::ToLL::Request& request, const MapFrame& ma
     response.message = kNoDatum;
     return response;
   }
-  const GeodeticPosition place = map->to_geodetic(to_vector(request.map_point));
-  response.success = std::isfinite(place.latitude_deg);
-  if (!response.success) response.message = "map_point is not finite";
+  const GeodeticPosition place = place_of(request.map_point, *map, response.message);
+  response.success = response.message.empty();
+  if (!response.success) return response;
   response.latitude = place.latitude_deg;
   response.longitude = place.longitude_deg;
   response.altitude = place.altitude_m;
@@ -73,10 +98,9 @@ srv::FromLLArray::Response answer(const srv::FromLLArray::Request& request, cons
   for (std::size_t i = 0; i < request.latitudes.size(); ++i) {
     const double altitude = request.altitudes.empty() ? map->datum().altitude_m : request.altitudes[i];
     const GeodeticPosition place{request.latitudes[i], request.longitudes[i], altitude};
-    for (const std::string& fault : position_faults(place)) {
-      response.message += (response.message.empty() ? element(i) : "; ") + fault;
-    }
-    if (!response.message.empty()) {
+    const std::string fault = joined(position_faults(place));
+    if (!fault.empty()) {
+      response.message = element(i) + fault;
       response.map_points.clear();
       return response;
     }
@@ -94,11 +118,12 @@ srv::ToLLArray::Response answer(const srv::ToLLArray::Request& request, const Ma
     return response;
   }
   for (std::size_t i = 0; i < request.map_points.size(); ++i) {
-    const GeodeticPosition place = map->to_geodetic(to_vector(request.map_points[i]));
-    if (!std::isfinite(place.latitude_deg)) {
+    std::string fault;
+    const GeodeticPosition place = place_of(request.map_points[i], *map, fault);
+    if (!fault.empty()) {
       srv::ToLLArray::Response refused;
       refused.success = false;
-      refused.message = element(i) + "is not finite";
+      refused.message = element(i) + fault;
       return refused;
     }
     response.latitudes.push_back(place.latitude_deg);

@@ -1,8 +1,10 @@
 #include "urban_gnss_localization/ros/node_parameters.hpp"
 
+#include <ros/callback_queue.h>
 #include <ros/ros.h>
 
 #include "urban_gnss_localization/parameters/params_file.hpp"
+#include "urban_gnss_localization/ros/event_log.hpp"
 
 namespace urban_gnss {
 namespace {
@@ -24,6 +26,15 @@ YAML::Node to_yaml(XmlRpc::XmlRpcValue& value) {
       return map;
     }
     default: return YAML::Node();
+  }
+}
+
+/// What a callback throws ends no node. NodeShell catches and counts; this is for callbacks that have none.
+void spin_some() {
+  try {
+    ros::getGlobalCallbackQueue()->callAvailable(ros::WallDuration(0.1));
+  } catch (const std::exception& error) {
+    ROS_ERROR_STREAM("a callback failed: " << log_line(error.what()));
   }
 }
 
@@ -65,7 +76,7 @@ int run_node(int argc, char** argv, const std::string& name,
   ros::NodeHandle private_node("~");
   try {
     const std::shared_ptr<void> alive = make(node, private_node);
-    ros::spin();
+    while (ros::ok()) spin_some();
   } catch (const std::exception& error) {
     ROS_FATAL_STREAM(error.what());
     return 1;

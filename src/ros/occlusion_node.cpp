@@ -1,10 +1,12 @@
 #include "urban_gnss_localization/ros/occlusion_node.hpp"
 
 #include <boost/make_shared.hpp>
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 #include <utility>
 
+#include "urban_gnss_localization/occlusion/map_file.hpp"
 #include "urban_gnss_localization/ros/conversions.hpp"
 #include "urban_gnss_localization/ros/node_parameters.hpp"
 #include "urban_gnss_localization/ros/receiver_messages.hpp"
@@ -15,15 +17,15 @@ namespace {
 
 /// As a shared pointer, which reaches subscribers in the same process without a copy.
 template <class Message>
-void publish_shared(const ros::Publisher& publisher, Message message) {
-  publisher.publish(boost::make_shared<const Message>(std::move(message)));
+void publish_shared(NodeShell& io, const ros::Publisher& publisher, Message message) {
+  io.publish_shared<Message>(publisher, boost::make_shared<const Message>(std::move(message)));
 }
 
 }  // namespace
 
 OcclusionNode::OcclusionNode(ros::NodeHandle& node, ros::NodeHandle& private_node)
-    : tf_listener_(tf_buffer_, node),
-      transforms_(tf_buffer_),
+    : tf_(node, io_),
+      transforms_(tf_.buffer()),
       diagnostics_(node, private_node, private_node.getNamespace()) {
   OcclusionNodeSettings settings;
   read_private_parameters(private_node, settings);
@@ -39,28 +41,36 @@ OcclusionNode::OcclusionNode(ros::NodeHandle& node, ros::NodeHandle& private_nod
   marker_publisher_ = node.advertise<visualization_msgs::MarkerArray>(topics::kVisibilityMarkers, 2);
   sky_publisher_ = node.advertise<sensor_msgs::Image>(topics::kSkyPlot, 2);
   map_publisher_ = node.advertise<sensor_msgs::PointCloud2>(topics::kOcclusionMap, 1, true);
-  const auto no_delay = ros::TransportHints().tcpNoDelay();
-  fix_subscriber_ = node.subscribe(topics::kFix, 100, &OcclusionNode::on_fix, this, no_delay);
-  fix_watch_.set_subscriber(fix_subscriber_);
-  satellites_subscriber_ = node.subscribe(topics::kSatellites, 100, &OcclusionNode::on_satellites, this, no_delay);
-  // A longer queue than cloud_queue: what is dropped is dropped in on_cloud(), which counts it.
-  cloud_subscriber_ = node.subscribe(topics::kPoints, 100, &OcclusionNode::on_cloud, this, no_delay);
-  estimate_subscriber_ = node.subscribe(topics::kEstimate, 100, &OcclusionNode::on_estimate, this, no_delay);
-  if (settings.pipeline.imu_orientation.imu_heading != ImuHeadingUse::kNone) {
-    imu_subscriber_ = node.subscribe(topics::kImu, 1000, &OcclusionNode::on_imu, this, no_delay);
-  }
-  clear_service_ = private_node.advertiseService("clear_map", &OcclusionNode::clear_map, this);
-  save_service_ = private_node.advertiseService("save_map", &OcclusionNode::save_map, this);
+  subscribe(node, settings.pipeline.imu_orientation.imu_heading != ImuHeadingUse::kNone);
+  clear_service_ = io_.serve<std_srvs::Trigger::Request, std_srvs::Trigger::Response>(
+      private_node, "clear_map", [this](auto&, auto& response) { clear_map(response); });
+  using urban_gnss_localization::SaveMap;
+  save_service_ = io_.serve<SaveMap::Request, SaveMap::Response>(
+      private_node, "save_map", [this](auto& request, auto& response) { save_map(request, response); });
 
   diagnostics_.setHardwareID("none");
   diagnostics_.add("occlusion", this, &OcclusionNode::diagnose);
-  work_timer_ = node.createWallTimer(ros::WallDuration(0.02), [this](const ros::WallTimerEvent&) { work(); });
-  second_timer_ = node.createWallTimer(ros::WallDuration(1.0), [this](const ros::WallTimerEvent&) {
-    fix_watch_.check_publishers();
-    diagnostics_.update();
-  });
-  map_timer_ = node.createWallTimer(ros::WallDuration(parameters_.map_publish_period),
-                                    [this](const ros::WallTimerEvent&) { publish_map(); });
+  work_timer_ = io_.every(node, 0.02, "the node's work", [this] { work(); });
+  second_timer_ = io_.every(node, 1.0, "the node's timer", [this] { every_second(); });
+  five_second_timer_ = io_.every(node, 5.0, "the node's timer", [this] { every_five_seconds(); });
+  map_timer_ = io_.every(node, parameters_.map_publish_period, "the map's timer", [this] { publish_map(); });
+}
+
+void OcclusionNode::subscribe(ros::NodeHandle& node, bool takes_imu) {
+  const auto no_delay = ros::TransportHints().tcpNoDelay();
+  fix_subscriber_ = io_.subscribe<sensor_msgs::NavSatFix>(
+      node, topics::kFix, 100, [this](const auto& m) { on_fix(m); }, no_delay);
+  fix_watch_.set_subscriber(fix_subscriber_);
+  satellites_subscriber_ = io_.subscribe<urban_gnss_localization::SatelliteArray>(
+      node, topics::kSatellites, 100, [this](const auto& m) { on_satellites(*m); }, no_delay);
+  // A longer queue than cloud_queue: what is dropped is dropped in on_cloud(), which counts it.
+  cloud_subscriber_ = io_.subscribe<sensor_msgs::PointCloud2>(
+      node, topics::kPoints, 100, [this](const auto& m) { on_cloud(m); }, no_delay);
+  estimate_subscriber_ = io_.subscribe_any<nav_msgs::Odometry>(
+      node, topics::kEstimate, 100, [this](const auto& m) { on_estimate(*m); }, no_delay);
+  if (!takes_imu) return;
+  imu_subscriber_ = io_.subscribe<sensor_msgs::Imu>(
+      node, topics::kImu, 1000, [this](const auto& m) { on_imu(*m); }, no_delay);
 }
 
 OcclusionNode::~OcclusionNode() { fix_subscriber_.shutdown(); }  // fix_watch_ holds it too
@@ -69,7 +79,7 @@ OcclusionNode::~OcclusionNode() { fix_subscriber_.shutdown(); }  // fix_watch_ h
 /// which drops them without a word.
 void OcclusionNode::on_cloud(const sensor_msgs::PointCloud2ConstPtr& message) {
   queue_->add_cloud(to_queued_cloud(message));
-  log();
+  io_.report(queue_->take_events());
 }
 
 void OcclusionNode::on_satellites(const urban_gnss_localization::SatelliteArray& message) {
@@ -96,37 +106,64 @@ void OcclusionNode::on_fix(const sensor_msgs::NavSatFixConstPtr& message) {
 /// One cloud, then what has come meanwhile.
 void OcclusionNode::work() {
   queue_->work();
-  log();
+  io_.report(queue_->take_events());
 }
 
-void OcclusionNode::log() {
-  for (const PipelineEvent& event : queue_->take_events()) {
-    if (event.level == PipelineEvent::Level::kInfo) {
-      ROS_INFO_STREAM(event.text);
-    } else {
-      ROS_WARN_STREAM(event.text);
-    }
+void OcclusionNode::every_second() {
+  fix_watch_.check_publishers();
+  diagnostics_.update();
+}
+
+void OcclusionNode::every_five_seconds() {
+  const std::string awaited = what_is_awaited();
+  if (!awaited.empty()) log_.warn("waiting for " + awaited);
+}
+
+/// Nothing can be done without fixes; without the others a fix is weighed by what there is, and its line says so.
+std::string OcclusionNode::what_is_awaited() const {
+  const auto publishers = [](const ros::Subscriber& subscriber) {
+    return " (" + subscriber.getTopic() + ": " + std::to_string(subscriber.getNumPublishers()) + " publishers)";
+  };
+  std::string awaited;
+  const auto add = [&awaited](const std::string& what) { awaited += (awaited.empty() ? "" : ", ") + what; };
+  if (queue_->newest_fix() == Stamp(0)) add("fixes" + publishers(fix_subscriber_));
+  if (queue_->tally().clouds == 0) add("clouds" + publishers(cloud_subscriber_));
+  if (!tf_.buffer().canTransform(frames_.odom, frames_.base_link, ros::Time(0))) {
+    add("tf from " + frames_.odom + " to " + frames_.base_link);
   }
+  return awaited;
 }
 
-/// `assessment`: null where there is nothing to weigh; who listens shall see what the receiver says.
+/// A fix without a place: who listens shall see what the receiver says, but no numbers that are none.
+void OcclusionNode::pass_on(const sensor_msgs::NavSatFix& message) {
+  sensor_msgs::NavSatFix without_place = message;
+  without_place.status.status = std::min<std::int8_t>(message.status.status, sensor_msgs::NavSatStatus::STATUS_NO_FIX);
+  for (double* each : {&without_place.latitude, &without_place.longitude, &without_place.altitude}) {
+    if (!std::isfinite(*each)) *each = 0.0;
+  }
+  without_place.position_covariance.fill(0.0);
+  without_place.position_covariance_type = sensor_msgs::NavSatFix::COVARIANCE_TYPE_UNKNOWN;
+  publish_shared(io_, fix_publisher_, std::move(without_place));
+}
+
+/// `assessment`: null where there is nothing to weigh.
 void OcclusionNode::publish(const sensor_msgs::NavSatFixConstPtr& message, const FixAssessment* assessment) {
   if (assessment == nullptr) {
-    fix_publisher_.publish(message);
+    pass_on(*message);
     return;
   }
   const ros::Time stamp = message->header.stamp;
   const OcclusionPipeline& pipeline = queue_->pipeline();
-  publish_shared(fix_publisher_, weighted_fix(*message, assessment->covariance));
+  publish_shared(io_, fix_publisher_, weighted_fix(*message, assessment->covariance));
   const auto visibility = boost::make_shared<const urban_gnss_localization::Visibility>(
       to_message(*assessment, claimed_covariance(*message), pipeline.parameters().covariance, stamp, frames_.odom));
-  visibility_publisher_.publish(visibility);
+  io_.publish_shared(visibility_publisher_, visibility);
   if (marker_publisher_.getNumSubscribers() > 0) {
-    publish_shared(marker_publisher_, ray_markers(*assessment, *visibility, stamp, frames_.odom));
+    publish_shared(io_, marker_publisher_, ray_markers(*assessment, *visibility, stamp, frames_.odom));
   }
   if (sky_publisher_.getNumSubscribers() > 0) {
     const auto skyline = assessment->has_map ? pipeline.skyline_at(assessment->antenna) : std::vector<double>();
-    publish_shared(sky_publisher_, sky_plot(*visibility, skyline, parameters_.sky_plot_size));
+    publish_shared(io_, sky_publisher_, sky_plot(*visibility, skyline, parameters_.sky_plot_size));
   }
 }
 
@@ -134,29 +171,27 @@ void OcclusionNode::publish_map() {
   const VoxelMap& map = queue_->pipeline().local_map().map();
   if (map_publisher_.getNumSubscribers() == 0 || map.size() == 0) return;
   // Stamped with the newest fix: the present time of the system may be another one than the messages'.
-  publish_shared(map_publisher_, to_message(map.points(), to_ros(queue_->newest_fix()), frames_.odom));
+  publish_shared(io_, map_publisher_, to_message(map.points(), to_ros(queue_->newest_fix()), frames_.odom));
 }
 
-bool OcclusionNode::clear_map(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {
+void OcclusionNode::clear_map(std_srvs::Trigger::Response& response) {
   queue_->clear_map();
   response.success = 1;
   response.message = !has_prior_map_ ? "the map is empty" : "the map is empty but for the prior map";
-  return true;
 }
 
-bool OcclusionNode::save_map(urban_gnss_localization::SaveMap::Request& request,
+void OcclusionNode::save_map(const urban_gnss_localization::SaveMap::Request& request,
                              urban_gnss_localization::SaveMap::Response& response) {
   const PointCloud points = queue_->pipeline().local_map().map().points();
   response.points = points.size();
   try {
     if (points.empty()) throw std::runtime_error("the map is empty");
-    write_pcd(request.file, points);
+    save_map_file(request.file, points, request.overwrite);
     response.success = 1;
   } catch (const std::exception& error) {
     response.success = 0;
-    response.message = error.what();
+    response.message = log_line(error.what());
   }
-  return true;
 }
 
 void OcclusionNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
@@ -180,9 +215,10 @@ void OcclusionNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status
   status.add("alignments accepted", tally.alignments_accepted);
   status.add("alignments tried", tally.alignments_tried);
   status.add("last alignment", tally.last_alignment);
-  status.add("tf", fault.empty() ? "no fault" : fault);
+  status.add("tf", fault.empty() ? "no fault" : log_line(fault));
   status.add("voxels", map.size());
   status.add("map memory (MB)", 1e-6 * static_cast<double>(map.memory_bytes()));
+  io_.diagnose(status);
 }
 
 }  // namespace urban_gnss

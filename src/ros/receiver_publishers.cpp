@@ -1,5 +1,6 @@
 #include "urban_gnss_localization/ros/receiver_publishers.hpp"
 
+#include "urban_gnss_localization/ros/event_log.hpp"
 #include "urban_gnss_localization/ros/receiver_messages.hpp"
 #include "urban_gnss_localization/ros/topics.hpp"
 
@@ -11,7 +12,7 @@ ReceiverPublishers::ReceiverPublishers(ros::NodeHandle& node)
       satellites_(node.advertise<urban_gnss_localization::SatelliteArray>(topics::kSatellites, 100)) {}
 
 void ReceiverPublishers::publish(const ReceiverOutput& output, const std::string& frame) const {
-  for (const std::string& warning : output.warnings) ROS_WARN_STREAM(warning);
+  for (const std::string& warning : output.warnings) ROS_WARN_STREAM(log_line(warning));
   for (const RawFix& fix : output.fixes) fix_.publish(to_message(fix, frame));
   for (const RawVelocity& velocity : output.velocities) velocity_.publish(to_message(velocity, frame));
   for (const SatelliteEpoch& epoch : output.satellites) satellites_.publish(to_message(epoch, frame));

@@ -20,8 +20,8 @@ RegisteredLocalizerNode::RegisteredLocalizerNode(ros::NodeHandle& node, ros::Nod
 
 void RegisteredLocalizerNode::publish(const LocalizationOutput& output) {
   if (!shell_) return;  // its constructor publishes what there is
-  if (particles_) particles_->publish(shell_->pipeline(), output.stamp);
-  if (bias_) bias_->publish(shell_->pipeline());
+  if (particles_) particles_->publish(shell_->pipeline(), output.stamp, shell_->shell());
+  if (bias_) bias_->publish(shell_->pipeline(), shell_->shell());
 }
 
 int run_localizer_node(int argc, char** argv, const std::string& name) {

@@ -81,14 +81,18 @@ PointCloud to_point_cloud(const sensor_msgs::PointCloud2& message) {
   const FloatField x = float_field(message, "x");
   const FloatField y = float_field(message, "y");
   const FloatField z = float_field(message, "z");
-  if (static_cast<std::size_t>(message.row_step) < static_cast<std::size_t>(message.width) * message.point_step ||
-      message.data.size() < static_cast<std::size_t>(message.row_step) * message.height) {
+  const std::size_t full_row = static_cast<std::size_t>(message.width) * message.point_step;
+  // Drivers leave row_step at 0, or write the length of the whole cloud there; without gaps it is known.
+  const std::size_t data_row = message.data.size() / message.height;
+  const bool has_no_gaps = data_row == full_row && message.data.size() % message.height == 0;
+  const std::size_t row_step = has_no_gaps ? full_row : message.row_step;
+  if (row_step < full_row || data_row < row_step) {
     throw std::invalid_argument("less data than width, height and row_step say");
   }
   PointCloud cloud;
   cloud.reserve(count);
   for (std::uint32_t row = 0; row < message.height; ++row) {
-    const std::uint8_t* point = message.data.data() + static_cast<std::size_t>(row) * message.row_step;
+    const std::uint8_t* point = message.data.data() + row * row_step;
     for (std::uint32_t i = 0; i < message.width; ++i, point += message.point_step) {
       cloud.emplace_back(read(point, x), read(point, y), read(point, z));
     }

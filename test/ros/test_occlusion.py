@@ -97,19 +97,33 @@ class OcclusionTest(unittest.TestCase):
         clear = rospy.ServiceProxy("occlusion/clear_map", Trigger)
         with tempfile.TemporaryDirectory() as folder:
             file = os.path.join(folder, "map.pcd")
-            answer = save(file)
+            answer = save(file, False)
             self.assertTrue(answer.success, answer.message)
             self.assertGreater(answer.points, 100)
             with open(file, "rb") as stream:
                 head = stream.read(1000).decode("latin-1")
             self.assertIn("POINTS %d\n" % answer.points, head)
-            refused = save(os.path.join(folder, "no", "such", "folder", "map.pcd"))
-            self.assertFalse(refused.success)
-            self.assertTrue(refused.message)
+            self.assertEqual(os.listdir(folder), ["map.pcd"])
+            link, other = os.path.join(folder, "link.pcd"), os.path.join(folder, "other.txt")
+            with open(other, "w") as stream:
+                stream.write("precious")
+            os.symlink(other, link)
+            for path, overwrite, word in (
+                    (os.path.join(folder, "no", "such", "map.pcd"), False, "no such folder"), ("map.pcd", False, "absolute"),
+                    ("", False, "absolute"), (other, True, "must end in .pcd"), (folder, True, "must end in .pcd"),
+                    (file, False, "is there already"), (link, True, "no ordinary file"),
+                    (file + "\n.pcd", False, "control characters"), (file + "\0.pcd", False, "control characters")):
+                refused = save(path, overwrite)
+                self.assertFalse(refused.success, path)
+                self.assertIn(word, refused.message)
+            with open(other) as stream:
+                self.assertEqual(stream.read(), "precious")
+            self.assertTrue(save(file, True).success)
+            self.assertEqual(sorted(os.listdir(folder)), ["link.pcd", "map.pcd", "other.txt"])
         before = answer.points
         self.assertTrue(clear().success)
         with tempfile.TemporaryDirectory() as folder:
-            self.assertLess(save(os.path.join(folder, "map.pcd")).points, before)
+            self.assertLess(save(os.path.join(folder, "map.pcd"), False).points, before)
         self.wait_for_fixes(5, "complete fix after the map was cleared", lambda v: not v.missing)
 
     def test_4_a_heading_off_by_half_a_turn_shows(self):

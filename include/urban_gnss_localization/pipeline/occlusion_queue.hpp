@@ -68,7 +68,7 @@ struct OcclusionTally {
   std::size_t fixes_weighed{0};
   std::map<std::string, std::size_t> fixes_without;  ///< of those, by what was missing
   std::size_t fixes_without_position{0};
-  std::size_t fixes_left_out{0};  ///< not newer than the one before
+  std::size_t fixes_left_out{0};  ///< not newer than the one before, or with a stamp far from it
 
   std::size_t all_clouds_left_out() const;
 };
@@ -89,7 +89,8 @@ class OcclusionQueue {
   void add_satellites(const SatelliteEpoch& epoch);
   /// `frame` of the IMU: its place in base_link tells how it is mounted. Until that is known, its axes are the base's.
   void add_imu(const ImuSample& sample, const std::string& frame);
-  /// Keeps the fix for work(). One that is not newer than the one before it is left out, and is not settled.
+  /// Keeps the fix for work(). One that is not newer than the one before it is left out, and is not settled; one whose
+  /// stamp is odd is held back until others go on from there (StampMonitor).
   void add_fix(QueuedFix fix);
   /// How well the localizer knows the heading, rad^2; the heading itself is that of map -> odom.
   void set_yaw_variance(double variance);
@@ -113,6 +114,7 @@ class OcclusionQueue {
   std::vector<PipelineEvent> take_events() { return std::exchange(events_, {}); }
 
  private:
+  void keep(QueuedFix fix);
   void start_anew();
   void forget_former_clock();
   bool is_overdue(Stamp stamp) const;
@@ -120,6 +122,7 @@ class OcclusionQueue {
   bool insert(const QueuedCloud& cloud);
   void leave_out(const QueuedCloud& cloud, const std::string& reason, const std::string& detail);
   void note(const QueuedCloud& cloud, const ScanReport& scan);
+  void note_alignment(const QueuedCloud& cloud, const ScanReport& scan);
   bool assess(const QueuedFix& fix);
   void place_antenna(const QueuedFix& fix);
   void say(PipelineEvent::Level level, const std::string& kind, Stamp stamp, const std::string& text);
@@ -134,6 +137,8 @@ class OcclusionQueue {
   PointCloud prior_;
   bool prior_is_in_{false};
   StampMonitor fix_stamps_;
+  StampMonitor cloud_stamps_;
+  std::vector<QueuedFix> odd_fixes_;  ///< held back
   std::deque<QueuedCloud> clouds_;
   std::deque<QueuedFix> fixes_;
   Stamp newest_{0};         ///< of the fixes: one of the future is a set-back clock at the next, a cloud's would stay

@@ -5,12 +5,17 @@
 
 #include <string>
 
+#include "urban_gnss_localization/ros/event_log.hpp"
+
 namespace urban_gnss {
 
 /// Watches one subscribed topic for two faults of a graph: two publishers at once, and a frame that changes. Reports
 /// each change once.
 class InputWatch {
  public:
+  /// Keeps the log.
+  explicit InputWatch(EventLog& log) : log_(log) {}
+
   void set_subscriber(const ros::Subscriber& subscriber) { subscriber_ = subscriber; }
   std::string topic() const { return subscriber_.getTopic(); }
   std::uint32_t publishers() const { return subscriber_.getNumPublishers(); }
@@ -23,6 +28,7 @@ class InputWatch {
   const std::string& frame() const { return frame_; }
 
  private:
+  EventLog& log_;
   ros::Subscriber subscriber_;
   std::string frame_;
   bool has_frame_{false};

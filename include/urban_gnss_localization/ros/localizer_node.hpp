@@ -7,9 +7,7 @@
 #include <sensor_msgs/Imu.h>
 #include <sensor_msgs/NavSatFix.h>
 #include <std_srvs/Empty.h>
-#include <tf2_ros/buffer.h>
 #include <tf2_ros/transform_broadcaster.h>
-#include <tf2_ros/transform_listener.h>
 #include <topic_tools/shape_shifter.h>
 #include <urban_gnss_localization/GpsBias.h>
 #include <urban_gnss_localization/SatelliteArray.h>
@@ -24,7 +22,9 @@
 #include "urban_gnss_localization/ros/event_log.hpp"
 #include "urban_gnss_localization/ros/input_watch.hpp"
 #include "urban_gnss_localization/ros/map_services.hpp"
+#include "urban_gnss_localization/ros/node_shell.hpp"
 #include "urban_gnss_localization/ros/sensor_frames.hpp"
+#include "urban_gnss_localization/ros/transform_input.hpp"
 
 namespace urban_gnss {
 
@@ -65,6 +65,7 @@ class LocalizerNode {
                 std::unique_ptr<Localizer> localizer, OutputHook on_output = {});
 
   const LocalizerNodeParameters& parameters() const { return parameters_; }
+  NodeShell& shell() { return io_; }
   LocalizationPipeline& pipeline() { return pipeline_; }
 
  private:
@@ -77,21 +78,23 @@ class LocalizerNode {
   void on_bias(const urban_gnss_localization::GpsBias& message);
   void on_initial_pose(const geometry_msgs::PoseWithCovarianceStamped& message);
   void on_datum(const sensor_msgs::NavSatFix& message);
-  bool set_pose(urban_gnss_localization::SetPose::Request& request,
-                urban_gnss_localization::SetPose::Response& response);
-  bool set_datum(urban_gnss_localization::SetDatum::Request& request,
+  void subscribe(ros::NodeHandle& node);
+  void serve(ros::NodeHandle& node, ros::NodeHandle& private_node);
+  void set_datum(const urban_gnss_localization::SetDatum::Request& request,
                  urban_gnss_localization::SetDatum::Response& response);
   /// toLL, fromLL, toLLArray, fromLLArray.
-  template <class Request, class Response>
-  bool convert(Request& request, Response& response) {
-    response = answer(request, pipeline_.frame());
-    return true;
+  template <class Service>
+  void serve_conversion(ros::NodeHandle& node, const std::string& name) {
+    services_.push_back(io_.serve<typename Service::Request, typename Service::Response>(
+        node, name, [this](auto& request, auto& response) { response = answer(request, pipeline_.frame()); }));
   }
-  bool reset(std_srvs::Empty::Request& request, std_srvs::Empty::Response& response);
 
   std::string try_pose(const geometry_msgs::PoseWithCovarianceStamped& message);
   void publish_results();
+  void publish_output(const LocalizationOutput& output);
   void publish_datum();
+  /// Of the odometry that was used last.
+  ros::Time now() const { return to_ros(pipeline_.latest_odometry().value_or(Stamp(0))); }
   void publish_status();
   void look_up_sensors();
   void every_second();
@@ -102,7 +105,7 @@ class LocalizerNode {
   LocalizationPipeline pipeline_;
   OutputHook on_output_;
   EventLog log_;
-  Stamp newest_input_{0};
+  NodeShell io_{log_};
   SensorFrames sensor_frames_;
   std::uint64_t outputs_{0};
 
@@ -112,11 +115,10 @@ class LocalizerNode {
   ros::Publisher datum_publisher_;
   std::vector<ros::Subscriber> subscribers_;
   std::vector<ros::ServiceServer> services_;
-  InputWatch odometry_watch_;
-  InputWatch fix_watch_;
+  InputWatch odometry_watch_{log_};
+  InputWatch fix_watch_{log_};
   tf2_ros::TransformBroadcaster broadcaster_;
-  tf2_ros::Buffer tf_buffer_;
-  tf2_ros::TransformListener tf_listener_{tf_buffer_};
+  std::optional<TransformInput> tf_;
   diagnostic_updater::Updater diagnostics_;
   ros::WallTimer second_timer_;
   ros::WallTimer five_second_timer_;

@@ -6,6 +6,7 @@
 
 #include "urban_gnss_localization/common/parameters.hpp"
 #include "urban_gnss_localization/pipeline/localization_pipeline.hpp"
+#include "urban_gnss_localization/ros/node_shell.hpp"
 
 namespace urban_gnss {
 
@@ -24,7 +25,7 @@ class ParticlePublisher {
   ParticlePublisher(ros::NodeHandle& node, const ParticlePublisherParameters& parameters, std::string frame);
 
   /// After an output of the pipeline. Requires a ParticleLocalizer in it.
-  void publish(const LocalizationPipeline& pipeline, Stamp stamp);
+  void publish(const LocalizationPipeline& pipeline, Stamp stamp, NodeShell& shell);
 
  private:
   ParticlePublisherParameters parameters_;
@@ -39,7 +40,7 @@ class BiasPublisher {
  public:
   BiasPublisher(ros::NodeHandle& node, std::string frame);
 
-  void publish(LocalizationPipeline& pipeline);
+  void publish(LocalizationPipeline& pipeline, NodeShell& shell);
 
  private:
   std::string frame_;

@@ -5,14 +5,16 @@
 #include <ros/ros.h>
 #include <sensor_msgs/Imu.h>
 #include <std_srvs/Trigger.h>
-#include <tf2_ros/transform_listener.h>
 #include <urban_gnss_localization/SaveMap.h>
 
 #include <memory>
+#include <string>
 
 #include "urban_gnss_localization/ros/input_watch.hpp"
+#include "urban_gnss_localization/ros/node_shell.hpp"
 #include "urban_gnss_localization/ros/occlusion_node_parameters.hpp"
 #include "urban_gnss_localization/ros/tf_frames.hpp"
+#include "urban_gnss_localization/ros/transform_input.hpp"
 #include "urban_gnss_localization/ros/visibility_messages.hpp"
 
 namespace urban_gnss {
@@ -38,23 +40,28 @@ class OcclusionNode {
   void on_estimate(const nav_msgs::Odometry& message);
   void on_imu(const sensor_msgs::Imu& message);
   void on_fix(const sensor_msgs::NavSatFixConstPtr& message);
+  void subscribe(ros::NodeHandle& node, bool takes_imu);
   void work();
-  void log();
+  void every_second();
+  void every_five_seconds();
+  std::string what_is_awaited() const;
+  void pass_on(const sensor_msgs::NavSatFix& message);
   void publish(const sensor_msgs::NavSatFixConstPtr& message, const FixAssessment* assessment);
   void publish_map();
-  bool clear_map(std_srvs::Trigger::Request& request, std_srvs::Trigger::Response& response);
-  bool save_map(urban_gnss_localization::SaveMap::Request& request,
+  void clear_map(std_srvs::Trigger::Response& response);
+  void save_map(const urban_gnss_localization::SaveMap::Request& request,
                 urban_gnss_localization::SaveMap::Response& response);
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
 
   Frames frames_;
   OcclusionNodeParameters parameters_;
-  tf2_ros::Buffer tf_buffer_;
-  tf2_ros::TransformListener tf_listener_;
+  EventLog log_;
+  NodeShell io_{log_};
+  TransformInput tf_;
   TfFrames transforms_;
   bool has_prior_map_{false};
   std::unique_ptr<OcclusionQueue> queue_;
-  InputWatch fix_watch_;
+  InputWatch fix_watch_{log_};
   diagnostic_updater::Updater diagnostics_;
   ros::Publisher fix_publisher_;
   ros::Publisher visibility_publisher_;
@@ -71,6 +78,7 @@ class OcclusionNode {
   ros::ServiceServer save_service_;
   ros::WallTimer work_timer_;
   ros::WallTimer second_timer_;
+  ros::WallTimer five_second_timer_;
   ros::WallTimer map_timer_;
 };
 

@@ -19,6 +19,7 @@ class RegisteredLocalizerNode {
   RegisteredLocalizerNode(ros::NodeHandle& node, ros::NodeHandle& private_node, const LocalizerEntry& entry);
 
   LocalizationPipeline& pipeline() { return shell_->pipeline(); }
+  NodeShell& shell() { return shell_->shell(); }
 
  private:
   void publish(const LocalizationOutput& output);
