@@ -1,7 +1,7 @@
 #include "urban_gnss_localization/ros/occlusion_node.hpp"
 
-#include <boost/make_shared.hpp>
 #include <algorithm>
+#include <boost/make_shared.hpp>
 #include <cmath>
 #include <stdexcept>
 #include <utility>
@@ -24,9 +24,7 @@ void publish_shared(NodeShell& io, const ros::Publisher& publisher, Message mess
 }  // namespace
 
 OcclusionNode::OcclusionNode(ros::NodeHandle& node, ros::NodeHandle& private_node)
-    : tf_(node, io_),
-      transforms_(tf_.buffer()),
-      diagnostics_(node, private_node, private_node.getNamespace()) {
+    : tf_(node, io_), transforms_(tf_.buffer()), diagnostics_(node, private_node, private_node.getNamespace()) {
   OcclusionNodeSettings settings;
   read_private_parameters(private_node, settings);
   frames_ = settings.frames;
