@@ -75,7 +75,10 @@ void OcclusionQueue::add_imu(const ImuSample& sample, const std::string& frame) 
 
 void OcclusionQueue::add_fix(QueuedFix fix) {
   const auto last = fix_stamps_.last();
-  const StampVerdict verdict = fix_stamps_.judge(fix.stamp);
+  const auto base = transforms_.newest(frames_.odom, frames_.base_link);  // its stamp is the odometry's time
+  const bool has_time = base && base->stamp != Stamp(0);
+  const StampVerdict verdict =
+      fix_stamps_.judge(fix.stamp, has_time ? std::optional<Stamp>(base->stamp) : std::nullopt);
   if (verdict == StampVerdict::kNotNewer) {
     ++tally_.fixes_left_out;
     say(Level::kWarn, "order", fix.stamp, "a fix is not newer than the one before it; left out");
