@@ -98,17 +98,6 @@ class StoredResults(unittest.TestCase):
         for row in rows:
             self.assertIn(row, self.page)
 
-    def test_occlusion_experiment(self):
-        """Every row of every table, the command, and the shares that the text names."""
-        results = stored("occlusion_experiment")
-        self.assertIn(results["command"], self.commands)
-        self.assertEqual(results["seeds"], list(range(1, 11)))
-        scenarios = results["scenarios"]
-        for table in (occlusion_report.table_1, occlusion_report.table_2, occlusion_report.table_student_t,
-                      occlusion_report.table_nees):
-            for line in occlusion_report.markdown(*table(scenarios)).splitlines():
-                self.assertIn(line, self.page)
-
 
 if __name__ == "__main__":
     unittest.main()
