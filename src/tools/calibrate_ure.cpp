@@ -2,15 +2,14 @@
 // occlusion_node.
 
 #include <algorithm>
-#include <filesystem>
 #include <iomanip>
 #include <iostream>
 #include <map>
 #include <sstream>
 
-#include "bag_messages.hpp"
 #include "command_line.hpp"
-#include "output_file.hpp"
+#include "files/bag_reader.hpp"
+#include "files/output_file.hpp"
 #include "replay/bag_receiver.hpp"
 #include "replay/nmea_log.hpp"
 #include "urban_gnss_localization/geometry/angles.hpp"
@@ -49,14 +48,13 @@ ReceiverRecording read_receiver(const ReplayOptions& options) {
     const auto day = options.nmea_date.empty() ? std::nullopt : std::optional<Day>(parse_date(options.nmea_date));
     return to_recording(read_nmea_log(options.nmea, day), options.nmea);
   }
-  if (!std::filesystem::exists(options.input)) throw std::runtime_error(options.input + ": no such bag");
-  rosbag::Bag bag(options.input, rosbag::bagmode::Read);
+  const BagReader bag(options.bags);
   const bool is_decoded = find_receiver_preset(options.receiver).make != nullptr;
   ReceiverRecording recording = is_decoded ? decode_receiver(bag, options) : read_receiver_topics(bag, options);
   if (recording.counts.fixes == 0 || recording.counts.epochs == 0) {
-    throw std::runtime_error(options.input + " has " + std::to_string(recording.counts.fixes) + " fixes and " +
+    throw std::runtime_error(bag.name() + " has " + std::to_string(recording.counts.fixes) + " fixes and " +
                              std::to_string(recording.counts.epochs) + " lists of satellites in " + recording.source +
-                             "; see --fix-topic, --satellites-topic and --receiver; it has" + topics_of(bag));
+                             "; see --fix-topic, --satellites-topic and --receiver; it has" + bag.topics());
   }
   return recording;
 }
@@ -183,14 +181,14 @@ void write_yaml(const Calibration& found, const std::string& command, std::ostre
   if (found.cn0.has_rise) out << std::setprecision(1) << "      nlos_cn0_rise: " << found.cn0.rise_db << "  # dB\n";
 }
 
-void run(const Options& options, const std::string& command) {
+void run(const Options& options, const CommandLine& line) {
   const Calibration found = calibrate(options);
   describe(found, std::cerr);
   warn(found);
   if (options.yaml_file.empty()) {
-    write_yaml(found, command, std::cout);
+    write_yaml(found, line.command(), std::cout);
   } else {
-    write_file(options.yaml_file, [&](std::ostream& out) { write_yaml(found, command, out); });
+    write_file(options.yaml_file, line.inputs(), [&](std::ostream& out) { write_yaml(found, line.command(), out); });
   }
 }
 
@@ -203,7 +201,7 @@ int main(int argc, char** argv) {
                    "sigma_URE and the C/N0 of free signals, from a receiver that stands still under a free sky (Maier "
                    "and Kleiner 2010, section IV.B); parameters of occlusion_node as YAML on standard output.");
   CLI::App& app = line.app();
-  auto* bag = app.add_option("bag", replay.input, "the bag to read");
+  auto* bag = app.add_option("bag", replay.bags, "the bag to read; several are one recording");
   app.add_option("--fix-topic", replay.fix_topic, "sensor_msgs/NavSatFix");
   app.add_option("--satellites-topic", replay.satellites_topic, "urban_gnss_localization/SatelliteArray");
   app.add_option("--velocity-topic", replay.velocity_topic, "the receiver's velocity, where the bag has it");
@@ -221,9 +219,9 @@ int main(int argc, char** argv) {
                  "LAT,LON (deg) of the antenna, where it is known; default: the mean of the fixes")
       ->delimiter(',')
       ->expected(2);
-  app.add_option("--yaml", options.yaml_file, "write the parameters here, and not to standard output");
+  line.add_output("--yaml", options.yaml_file, "write the parameters here, and not to standard output");
   return line.run(argc, argv, [&] {
     if (bag->count() == 0 && replay.nmea.empty()) throw std::runtime_error("which bag? See --help");
-    run(options, line.command());
+    run(options, line);
   });
 }
