@@ -27,6 +27,8 @@ namespace {
 constexpr double kMostly = 0.95;
 /// Below it, the fixes say too little of their own.
 constexpr double kFewIndependent = 10.0;
+/// Of residuals over fixes. Above it the ranges have more than noise.
+constexpr double kReflections = 10.0;
 
 struct Options {
   ReplayOptions replay;
@@ -164,6 +166,9 @@ void warn(const Calibration& found) {
   if (found.ure.independent_errors < kFewIndependent) {
     std::cerr << "warning: the fixes' errors last too long for this recording: sigma_URE by fixes is a lower bound; "
                  "record for hours, or give --place\n";
+  }
+  if (found.sigma_m() > kReflections * found.ure.sigma_m) {
+    std::cerr << "warning: the residuals say much more than the fixes, as reflections do: is the sky free?\n";
   }
   if (!found.cn0.has_rise) std::cerr << "warning: all satellites are of about one elevation: no nlos_cn0_rise\n";
 }

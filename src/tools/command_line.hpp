@@ -46,7 +46,7 @@ class CommandLine {
     app_.add_option(option, overrides, whose + ", as docs/parameters.md names it, NAME=VALUE; repeatable");
   }
   /// A file to write. No two of them may be the same one, nor one that the program reads: all other options that name a
-  /// file or a folder are taken for what it reads.
+  /// file are taken for what it reads.
   CLI::Option* add_output(const std::string& name, std::string& file, const std::string& what) {
     CLI::Option* const option = app_.add_option(name, file, what);
     outputs_.push_back(option);
@@ -113,8 +113,8 @@ class CommandLine {
       if (has(outputs_, option) || has(output_folders_, option)) continue;
       for (const std::string& value : option->results()) {
         if (value.empty()) continue;
-        inputs_.add(value);
-        inputs_.add(value.substr(value.find('=') + 1));
+        inputs_.add_file(value);
+        inputs_.add_file(value.substr(value.find('=') + 1));
       }
     }
   }
@@ -124,7 +124,7 @@ class CommandLine {
       if (option->count() == 0 || option->results().back().empty()) continue;
       const std::filesystem::path path = inputs_.checked(option->results().back());
       std::error_code error;
-      const auto whole = std::filesystem::weakly_canonical(path, error);
+      const auto whole = std::filesystem::weakly_canonical(std::filesystem::absolute(path, error), error);
       const bool is_file = !std::filesystem::exists(path, error) || std::filesystem::is_regular_file(path, error);
       if (is_file && !known.insert(whole).second) {
         throw std::runtime_error(option->get_name() + " " + path.string() + ": another option writes this file, too");

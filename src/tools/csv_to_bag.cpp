@@ -22,8 +22,8 @@
 #include <string>
 #include <vector>
 
-#include "command_line.hpp"
 #include "bag_contents.hpp"
+#include "command_line.hpp"
 #include "csv_table.hpp"
 #include "urban_gnss_localization/geometry/angles.hpp"
 #include "urban_gnss_localization/geometry/local_frame.hpp"
@@ -302,6 +302,16 @@ void add_truth(const CsvTable& table, BagContents& contents) {
   }
 }
 
+using AddTable = void (*)(const CsvTable&, BagContents&);
+
+/// A file that may be missing.
+struct OptionalTable {
+  const char* name;
+  AddTable add;
+};
+constexpr OptionalTable kOptionalTables[] = {
+    {"imu.csv", add_imu}, {"sats.csv", add_satellites}, {"gnss_vel.csv", add_velocities}, {"truth.csv", add_truth}};
+
 void convert(const fs::path& folder, const std::string& gnss_file, const OdometryNoise& noise, const fs::path& output,
              const urban_gnss::InputFiles& inputs) {
   const GeodeticPosition origin = read_origin(folder / "meta.json");
@@ -310,14 +320,10 @@ void convert(const fs::path& folder, const std::string& gnss_file, const Odometr
   if (odometry.size() == 0) throw std::runtime_error(odometry.path() + ": has no rows");
   if (fixes.size() == 0) throw std::runtime_error(fixes.path() + ": has no rows");
 
-  std::vector<std::pair<CsvTable, void (*)(const CsvTable&, BagContents&)>> optional_tables;
-  const auto find_optional = [&](const char* name, void (*add)(const CsvTable&, BagContents&)) {
-    if (fs::exists(folder / name)) optional_tables.emplace_back(read_table(folder / name), add);
-  };
-  find_optional("imu.csv", add_imu);
-  find_optional("sats.csv", add_satellites);
-  find_optional("gnss_vel.csv", add_velocities);
-  find_optional("truth.csv", add_truth);
+  std::vector<std::pair<CsvTable, AddTable>> optional_tables;
+  for (const OptionalTable& table : kOptionalTables) {
+    if (fs::exists(folder / table.name)) optional_tables.emplace_back(read_table(folder / table.name), table.add);
+  }
 
   Stamp start = std::min(odometry.stamp(0), fixes.stamp(0));
   for (const auto& [table, add] : optional_tables) {
@@ -351,9 +357,10 @@ int main(int argc, char** argv) {
   OdometryNoise noise;
   urban_gnss::CommandLine line("csv_to_bag", "Makes a bag out of a folder of recorded CSV files.");
   line.app()
-      .add_option("DIR", folder,
-                  "folder with meta.json, odom.csv and the fixes; sats.csv, gnss_vel.csv, imu.csv and truth.csv are used "
-                  "where present")
+      .add_option(
+          "DIR", folder,
+          "folder with meta.json, odom.csv and the fixes; sats.csv, gnss_vel.csv, imu.csv and truth.csv are used "
+          "where present")
       ->required();
   line.add_output("OUT", output, "bag to write")->required();
   line.app().add_option("--gnss-file", gnss_file, "file in DIR with the fixes");
@@ -367,7 +374,10 @@ int main(int argc, char** argv) {
       .add_option("--yaw-rate-sigma", noise.yaw_rate_rad_s, "declared noise of its yaw rate, rad/s")
       ->check(CLI::Range(1e-6, 1e6));
   return line.run(argc, argv, [&] {
-    line.reads(fs::path(folder) / gnss_file);
+    for (const std::string& name : {std::string("meta.json"), std::string("odom.csv"), gnss_file}) {
+      line.reads(fs::path(folder) / name);
+    }
+    for (const OptionalTable& table : kOptionalTables) line.reads(fs::path(folder) / table.name);
     convert(folder, gnss_file, noise, output, line.inputs());
   });
 }

@@ -64,8 +64,9 @@ class CalibrateUreTest(unittest.TestCase):
         found = yaml.safe_load(done.stdout)
         self.assertTrue(0.2 < found["sigma_ure"] < 6.0, done.stdout)
         covariance = found["expert"]["covariance"]
-        # The simulated antenna: 43.4 dB-Hz at 37 degrees in the open, 9 dB more at the zenith than at the horizon.
-        self.assertAlmostEqual(covariance["nlos_cn0"], 43.4, delta=4.0)
+        # The simulated antenna: 43.4 dB-Hz at 37 degrees in the open, of which 1 % are some 4 dB weaker; 9 dB more at the
+        # zenith than at the horizon.
+        self.assertAlmostEqual(covariance["nlos_cn0"], 39.4, delta=2.0)
         self.assertAlmostEqual(covariance["nlos"]["nlos_cn0_rise"], 9.0, delta=3.0)
         with open(os.path.join(PACKAGE, "config", "occlusion.yaml")) as file:
             known = yaml.safe_load(file)
@@ -90,7 +91,7 @@ class CalibrateUreTest(unittest.TestCase):
         self.assertIn("no such bag", self.refuse(os.path.join(self.scratch.name, "none.bag")))
 
     def test_too_few_fixes_are_refused(self):
-        self.assertIn("at least 30 are needed", self.refuse(self.standing, "--duration", "20"))
+        self.assertIn("at least 30 are needed", self.refuse(self.standing, "--duration", "4"))
         self.assertIn("an HDOP above", self.refuse(self.standing, "--max-hdop", "0.2"))
 
     @unittest.skipUnless(os.path.isdir(STATIC), "no recording " + STATIC)
@@ -98,8 +99,9 @@ class CalibrateUreTest(unittest.TestCase):
         bag = os.path.join(self.scratch.name, "static.bag")
         self.assertEqual(run("csv_to_bag", STATIC, bag).returncode, 0)
         done = self.succeed(bag)
-        self.assertIn("warning", done.stderr)  # two minutes and a half tell little
-        self.assertTrue(0.2 < yaml.safe_load(done.stdout)["sigma_ure"] < 20.0, done.stdout)
+        self.assertIn("is the sky free?", done.stderr)  # it is not: Hong Kong
+        self.assertIn("by 986 fixes", done.stderr)
+        self.assertTrue(0.2 < yaml.safe_load(done.stdout)["sigma_ure"] < 60.0, done.stdout)
         self.assertTrue(re.search(r"C/N0 by \d+ signals", done.stderr), done.stderr)
 
 

@@ -215,7 +215,8 @@ class WholeTest(FilesTest):
         os.mkdir(self.path("folder"))
         self.expect_refusal("folder: cannot be written: Is a directory", "replay", "drive_none.bag", "--json", "folder")
         self.expect_refusal("its folder cannot be made", "replay", "drive_none.bag", "--json", "table.csv/x")
-        self.expect_refusal("its folder cannot be made", "evaluate", "drive_none.bag", "--output", "table.csv")
+        self.expect_refusal("its folder cannot be made", "evaluate", "drive_none.bag", "--estimate-topic", "/odom",
+                            "--output", "table.csv")
 
     def test_python(self):
         path = self.path("x.json")

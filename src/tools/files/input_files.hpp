@@ -15,12 +15,12 @@ class InputFiles {
  public:
   /// A file, or all files of a folder; nothing where there is none of this name.
   void add(const std::filesystem::path& path);
+  /// A file; nothing where there is none of this name.
+  void add_file(const std::filesystem::path& path);
   /// `output`. Throws std::runtime_error that names both where it is one of the files.
   const std::filesystem::path& checked(const std::filesystem::path& output) const;
 
  private:
-  void add_file(const std::filesystem::path& path);
-
   std::map<std::pair<dev_t, ino_t>, std::string> files_;
 };
 
