@@ -176,7 +176,8 @@ struct Agreement {
 /// Expectation maximization weighs what it is not sure of, the likeliest assignment does not: the two agree where one
 /// assignment stands out. In all well-conditioned cases, what matters is the error.
 TEST(RangeFixJudgement, AgreesWithAllAssignmentsTried) {
-  const RangeFixParameters p;
+  RangeFixParameters p;
+  p.range_sigma = 5.0;  // of the figures below
   RandomEngine engine = make_engine(120);
   Agreement all, sure;
   double by_em = 0.0;

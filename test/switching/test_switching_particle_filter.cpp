@@ -27,8 +27,8 @@ TEST(SwitchingParticleFilter, ParametersAreCheckedDownToThoseOfRanges) {
     reader.read(parameters);
     return reader.finish();
   };
-  EXPECT_TRUE(faults_of("{range_sigma_min: 5.0, range_sigma_max: 5.0}").empty());
-  const auto faults = faults_of("{range_sigma_min: 6.0, range_sigma_max: 4.0}");
+  EXPECT_TRUE(faults_of("{range_sigma_min: 4.0, range_sigma_max: 4.0}").empty());
+  const auto faults = faults_of("{range_sigma_min: 6.0, range_sigma_max: 5.0}");
   ASSERT_EQ(faults.size(), 1u);
   EXPECT_NE(faults.front().find("range_sigma"), std::string::npos) << faults.front();
 }
