@@ -173,7 +173,7 @@ def write_scenario(folder):
     write_text(folder, "blocks.csv", "\n".join(blocks) + "\n")
     track = ["stamp,x,y"] + ["%.2f,%.3f,%.3f" % (0.1 * i, 0.5 * i, -3 + math.sin(0.05 * i)) for i in range(100)]
     write_text(folder, "track.csv", "\n".join(track) + "\n")
-    write_text(folder, "sky.alm", "".join(ALMANAC.format(k + 1, 0.7 * k - 3, 1.1 * k - 3) for k in range(10)))
+    write_text(folder, "sky.alm", "".join(ALMANAC.format(k + 1, 0.7 * k - 3, 0.6 * k - 3) for k in range(10)))
 
 
 def write_nmea(folder):

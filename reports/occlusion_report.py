@@ -134,7 +134,7 @@ def table_2(scenarios):
         for name in ("odometry",) + MODELS:
             if name not in trajectories:
                 continue
-            base = trajectories[base_of(name)] if name in CLASSIFYING else None
+            base = trajectories.get(base_of(name)) if name in CLASSIFYING else None
             rows.append(row_of_table_2(scenario, "odometry alone" if name == "odometry" else name, trajectories[name],
                                        base))
     for log, values in PAPER_TABLE_2.items():

@@ -100,7 +100,7 @@ class SimulateTest(unittest.TestCase):
             self.assertGreater(odom.twist.covariance[0], 0.0)
             self.assertGreater(odom.twist.covariance[35], 0.0)
         for imu in self.of("a.bag", "/imu/data"):
-            self.assertEqual(imu.orientation_covariance[0], -1.0)
+            self.assertGreaterEqual(imu.orientation_covariance[0], 0.0)  # it has an orientation
             self.assertGreater(imu.angular_velocity_covariance[8], 0.0)
             self.assertAlmostEqual(imu.linear_acceleration.z, 9.8, delta=0.5)
         for truth in self.of("a.bag", "/ground_truth/odom"):

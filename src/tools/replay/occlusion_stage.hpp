@@ -22,7 +22,7 @@
 namespace urban_gnss {
 
 /// A fix as the localizer gets it.
-struct WeighedFix {
+struct WeighedMessage {
   sensor_msgs::NavSatFix fix;
   std::optional<urban_gnss_localization::Visibility> visibility;  ///< nothing where the fix has no position
 };
@@ -47,7 +47,7 @@ class OcclusionStage {
   void finish();
 
   /// The fixes that have been settled since it was asked last.
-  std::vector<WeighedFix> take() { return std::exchange(settled_, {}); }
+  std::vector<WeighedMessage> take() { return std::exchange(settled_, {}); }
   std::vector<PipelineEvent> take_events();
   /// What has been done: clouds, fixes and satellites by what became of them.
   nlohmann::json report() const;
@@ -61,7 +61,7 @@ class OcclusionStage {
   tf2::BufferCore tf_;
   TfFrames transforms_;
   OcclusionQueue queue_;
-  std::vector<WeighedFix> settled_;
+  std::vector<WeighedMessage> settled_;
   std::size_t fixes_with_map_{0};
   std::size_t fixes_widened_{0};
   std::size_t fixes_bad_{0};

@@ -101,7 +101,7 @@ void ReplayRun::add_fix(const sensor_msgs::NavSatFix& message) {
 
 void ReplayRun::take_weighed() {
   print(occlusion_->take_events());
-  for (const WeighedFix& weighed : occlusion_->take()) {
+  for (const WeighedMessage& weighed : occlusion_->take()) {
     const Stamp stamp = to_stamp(weighed.fix.header.stamp);
     write(topics::kWeightedFix, stamp, weighed.fix);
     if (weighed.visibility) write(topics::kVisibility, stamp, *weighed.visibility);
