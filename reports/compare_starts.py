@@ -42,14 +42,12 @@ def span_of(folder):
 def replay_from(bag, start_s, options, path):
     """What replay says of a part of the bag; None where there was no estimate in it."""
     try:
-        recordings.call(*recordings.program("replay"), bag, "--localizer", options.localizer, "--start", str(start_s),
-                        "--duration", str(options.duration), "--json", path, *recordings.set_arguments(options))
+        return recordings.replay(bag, path, options.localizer, "--start", str(start_s), "--duration",
+                                 str(options.duration), *recordings.set_arguments(options))
     except common.ReportError as error:
         if "no estimate" in str(error):
             return None
         raise
-    with open(path, encoding="utf-8") as stream:
-        return json.load(stream)
 
 
 def run_recording(name, options):

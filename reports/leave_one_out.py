@@ -58,10 +58,8 @@ def run_recording(name, options):
     found = {}
     for chosen in sets():
         arguments = [part for text in chosen for part in ("--set", text)]
-        recordings.call(*recordings.program("replay"), bag, "--localizer", LOCALIZER, "--json", path, *arguments,
-                        *recordings.set_arguments(options))
-        with open(path, encoding="utf-8") as stream:
-            found[chosen] = json.load(stream)["errors"]
+        report = recordings.replay(bag, path, LOCALIZER, *arguments, *recordings.set_arguments(options))
+        found[chosen] = report["errors"]
     return found
 
 

@@ -1,6 +1,7 @@
 """What the reports about recordings share: the folder of recordings, the programs that run them, tables in docs/."""
 
 import concurrent.futures
+import json
 import os
 import subprocess
 import sys
@@ -55,6 +56,13 @@ def call(*command):
         lines = (done.stderr.strip() or done.stdout.strip() or "failed without a word").splitlines()
         raise common.ReportError("{}: {}".format(os.path.basename(command[0]), lines[-1]))
     return done.stdout
+
+
+def replay(bag, path, localizer, *arguments):
+    """What replay says of a run; it stays in the file `path`."""
+    call(*program("replay"), bag, "--localizer", localizer, "--json", path, *arguments)
+    with open(path, encoding="utf-8") as stream:
+        return json.load(stream)
 
 
 def find_recordings(directory, chosen):

@@ -8,8 +8,6 @@
 namespace urban_gnss {
 namespace {
 
-constexpr double kMaxCoordinate_m = 1e7;  ///< as of the odometry
-
 std::string position_fault(const char* name, double value_m) {
   if (std::abs(value_m) <= kMaxCoordinate_m) return {};
   std::ostringstream text;
@@ -19,12 +17,16 @@ std::string position_fault(const char* name, double value_m) {
 
 }  // namespace
 
-std::string estimate_fault(const PoseEstimate& estimate) {
-  for (const std::string& fault : {position_fault("x", estimate.pose.x), position_fault("y", estimate.pose.y)}) {
+std::string pose_fault(const Pose2& pose) {
+  for (const std::string& fault : {position_fault("x", pose.x), position_fault("y", pose.y)}) {
     if (!fault.empty()) return fault;
   }
-  if (!std::isfinite(estimate.pose.yaw)) return "yaw is not finite";
-  return covariance_fault(estimate.covariance, {"x", "y", "yaw"});
+  return std::isfinite(pose.yaw) ? "" : "yaw is not finite";
+}
+
+std::string estimate_fault(const PoseEstimate& estimate) {
+  const std::string fault = pose_fault(estimate.pose);
+  return fault.empty() ? covariance_fault(estimate.covariance, {"x", "y", "yaw"}) : fault;
 }
 
 }  // namespace urban_gnss

@@ -27,10 +27,11 @@ std::optional<Eigen::Vector2d> mean_place(const std::vector<TimedPosition>& fixe
 
 bool moves(const std::vector<TimedPosition>& fixes, const std::vector<RawVelocity>& velocities, Stamp stamp) {
   std::vector<double> speeds;
-  for (const RawVelocity& each : velocities) {
-    if (std::abs(to_seconds(each.stamp - stamp)) <= kHalf_s && each.velocity.allFinite()) {
-      speeds.push_back(each.velocity.norm());
-    }
+  const Stamp half = from_seconds(kHalf_s);
+  const auto is_before = [](const RawVelocity& each, Stamp value) { return each.stamp < value; };
+  auto each = std::lower_bound(velocities.begin(), velocities.end(), stamp - half, is_before);
+  for (; each != velocities.end() && each->stamp <= stamp + half; ++each) {
+    if (each->velocity.allFinite()) speeds.push_back(each->velocity.norm());
   }
   if (speeds.size() >= kFewestVelocities) return upper_median(std::move(speeds)) > kStill_mps;
   const auto before = mean_place(fixes, stamp, -kHalf_s, 0.0);

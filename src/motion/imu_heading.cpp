@@ -25,7 +25,7 @@ EnumNames<ImuHeadingUse> enum_names(ImuHeadingUse) {
 }
 
 bool HeadingCalibration::is_due(Stamp stamp) const {
-  return parameters_.imu_heading != ImuHeadingUse::kNone &&
+  return parameters_.is_used() &&
          (comparisons_.empty() || std::abs(to_seconds(stamp - comparisons_.back().stamp)) >= kInterval_s);
 }
 
@@ -66,7 +66,7 @@ HeadingCalibration::Scatter HeadingCalibration::scatter() const {
 
 std::optional<HeadingSample> HeadingCalibration::calibrated(const HeadingSample& told) const {
   const bool is_learnt = parameters_.imu_heading == ImuHeadingUse::kLearnt;
-  if (parameters_.imu_heading == ImuHeadingUse::kNone || (is_learnt && !is_known())) return std::nullopt;
+  if (!parameters_.is_used() || (is_learnt && !is_known())) return std::nullopt;
   const Scatter found = scatter();
   // What is learnt is no better than the headings that it is learnt from, which may share their errors.
   const double systematic_rad2 = is_learnt ? found.other_variance_rad2 : found.mean_rad * found.mean_rad;

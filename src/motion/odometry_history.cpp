@@ -3,12 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "urban_gnss_localization/geometry/pose_faults.hpp"
+
 namespace urban_gnss {
 namespace {
 
 constexpr double kMaxSpeed_mps = 150.0;
 constexpr double kMaxYawRate_radps = 50.0;
-constexpr double kMaxCoordinate_m = 1e7;
 
 }  // namespace
 

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "urban_gnss_localization/geometry/angles.hpp"
+#include "urban_gnss_localization/geometry/isometry.hpp"
 
 namespace urban_gnss {
 
@@ -65,8 +66,7 @@ void LocalMap::follow(std::optional<double> bearing_rad, const Eigen::Isometry3d
     odometry_from_bearing_rad_.reset();
     return;
   }
-  const Eigen::Vector3d forward = base_in_map.linear().col(0);
-  const double difference_rad = wrap_angle(std::atan2(forward.y(), forward.x()) - *bearing_rad);
+  const double difference_rad = wrap_angle(yaw_of(base_in_map) - *bearing_rad);
   const double before_rad = odometry_from_bearing_rad_.value_or(difference_rad);
   odometry_from_bearing_rad_ = difference_rad;
   const double excess_rad = angle_difference(before_rad, difference_rad);

@@ -5,14 +5,14 @@
 #include <stdexcept>
 #include <system_error>
 
+#include "urban_gnss_localization/common/control_characters.hpp"
+
 namespace urban_gnss {
 namespace {
 
 namespace fs = std::filesystem;
 
 constexpr std::size_t kLongestPath = 4095;
-
-bool is_control(char character) { return static_cast<unsigned char>(character) < 0x20 || character == 0x7f; }
 
 }  // namespace
 
@@ -33,21 +33,7 @@ std::string map_file_fault(const std::string& path, bool overwrite) {
 void save_map_file(const std::string& path, const PointCloud& map, bool overwrite) {
   const std::string fault = map_file_fault(path, overwrite);
   if (!fault.empty()) throw std::runtime_error(fault);
-  const std::string unfinished = path + ".unfinished.pcd";
-  std::error_code error;
-  fs::remove(unfinished, error);  // of a run that was killed; never through a link
-  try {
-    write_pcd(unfinished, map);
-  } catch (...) {
-    fs::remove(unfinished, error);
-    throw;
-  }
-  fs::rename(unfinished, path, error);
-  if (error) {
-    const std::string why = error.message();
-    fs::remove(unfinished, error);
-    throw std::runtime_error(path + ": cannot be written: " + why);
-  }
+  write_pcd(path, map);
 }
 
 }  // namespace urban_gnss

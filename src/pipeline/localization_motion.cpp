@@ -7,6 +7,7 @@
 #include "limits.hpp"
 #include "text.hpp"
 #include "told_start.hpp"
+#include "urban_gnss_localization/geometry/pose_faults.hpp"
 #include "urban_gnss_localization/pipeline/localization_pipeline.hpp"
 
 namespace urban_gnss {
@@ -48,14 +49,14 @@ void LocalizationPipeline::add_odometry(const OdometrySample& message) {
     const MotionDoubt doubt{speed_.doubt_m2(), yaw_rate_.doubt_rad2()};
     if (doubt.exists()) doubt_motion(doubt);
     correct_heading();
-    guard_state({localizer_->pose(), Eigen::Matrix3d::Zero()});
+    guard_state(pose_fault(localizer_->pose()));
   }
   if (!initialized() && start_.given() && frame()) start_from(told(*start_.given(), "the given pose"));
   process_velocities();
   process_fixes();
   if (!initialized()) return;
   const PoseEstimate published = estimate();
-  if (guard_state(published)) outputs_.push_back({sample.stamp, published, sample.pose, twist});
+  if (guard_state(estimate_fault(published))) outputs_.push_back({sample.stamp, published, sample.pose, twist});
 }
 
 void LocalizationPipeline::doubt_motion(const MotionDoubt& doubt) {
@@ -176,7 +177,7 @@ void LocalizationPipeline::process_velocity(const RawVelocity& velocity) {
   if (!initialized() || !localizer_->takes_velocity()) return;
   localizer_->correct_velocity(matched->measurement);
   reporter_.count_velocity();
-  guard_state(localizer_->estimate());
+  guard_state(estimate_fault(localizer_->estimate()));
 }
 
 void LocalizationPipeline::compare_speed(const MatchedVelocity& velocity) {

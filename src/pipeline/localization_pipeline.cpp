@@ -262,7 +262,7 @@ void LocalizationPipeline::correct_with(const ValidatedFix& fix) {
   if (outcome.decision == FixDecision::kAccepted) outcome.decision = fix.outcome.decision;
   if (outcome.reason.empty()) outcome.reason = fix.outcome.reason;
   decide(std::move(outcome));
-  guard_state(localizer_->estimate());
+  guard_state(estimate_fault(localizer_->estimate()));
 }
 
 void LocalizationPipeline::watch_integrity(const ValidatedFix& fix, const Eigen::Vector2d& antenna_in_body) {
@@ -338,8 +338,7 @@ std::optional<Eigen::Vector2d> LocalizationPipeline::predicted_antenna(Stamp sta
   return transform_point(compose(localizer_->pose(), *motion), antenna_);
 }
 
-bool LocalizationPipeline::guard_state(const PoseEstimate& estimate) {
-  const std::string fault = estimate_fault(estimate);
+bool LocalizationPipeline::guard_state(const std::string& fault) {
   if (fault.empty()) return true;
   event(Level::kError, "the estimate is none (" + fault + "): starting anew from the fixes");
   ++broken_states_;
@@ -349,7 +348,7 @@ bool LocalizationPipeline::guard_state(const PoseEstimate& estimate) {
 
 PoseEstimate LocalizationPipeline::estimate() const {
   PoseEstimate published = localizer_->estimate();
-  if (estimate_fault(published).empty() && !is_positive_definite<3>(published.covariance)) {
+  if (!is_positive_definite<3>(published.covariance) && estimate_fault(published).empty()) {
     published.covariance = nearest_positive_definite<3>(published.covariance);  // of particles that are all the same
   }
   if (!localizer_->is_as_printed()) published.covariance.topLeftCorner<2, 2>() += integrity_.covariance();

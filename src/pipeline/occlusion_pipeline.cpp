@@ -13,11 +13,6 @@ namespace {
 /// Standard deviation of a heading from which the IMU's may be learnt.
 constexpr double kComparable_rad = 0.2;
 
-double yaw_of(const Eigen::Isometry3d& base) {
-  const Eigen::Vector3d forward = base.linear().col(0);
-  return std::atan2(forward.y(), forward.x());
-}
-
 void append(std::string& text, const std::string& more) { text += (text.empty() ? "" : ", ") + more; }
 
 }  // namespace

@@ -5,6 +5,8 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "urban_gnss_localization/geometry/isometry.hpp"
+
 namespace urban_gnss {
 
 using Level = PipelineEvent::Level;
@@ -169,8 +171,7 @@ void OcclusionQueue::update_alignment() {
   const auto found = transforms_.newest(frames_.map, frames_.odom);
   if (!found) return;
   WorldAlignment alignment;
-  const Eigen::Vector3d x = found->pose.linear().col(0);
-  alignment.odom_in_world = {found->pose.translation().x(), found->pose.translation().y(), std::atan2(x.y(), x.x())};
+  alignment.odom_in_world = {found->pose.translation().x(), found->pose.translation().y(), yaw_of(found->pose)};
   alignment.yaw_sigma_rad = yaw_sigma_;
   alignment.stamp = found->stamp == Stamp(0) ? newest_ : found->stamp;
   pipeline_.set_alignment(alignment);

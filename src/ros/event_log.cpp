@@ -4,6 +4,8 @@
 
 #include <algorithm>
 
+#include "urban_gnss_localization/common/control_characters.hpp"
+
 namespace urban_gnss {
 namespace {
 
@@ -11,7 +13,6 @@ constexpr std::size_t kLongest = 200;
 constexpr std::size_t kMostLines = 20;
 const ros::WallDuration kQuiet(4.5);
 
-bool is_control(char character) { return static_cast<unsigned char>(character) < 0x20 || character == 0x7f; }
 bool is_of_a_number(char character) { return (character >= '0' && character <= '9') || character == '.'; }
 
 }  // namespace

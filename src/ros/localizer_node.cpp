@@ -69,9 +69,7 @@ void LocalizerNode::subscribe(ros::NodeHandle& node) {
   }
   add(io_.subscribe<SatelliteArray>(
       node, topics::kSatellites, 100, [this](const auto& m) { on_satellites(*m); }, kNoDelay));
-  if (parameters_.localization.imu.use_imu_yaw_rate ||
-      (pipeline_.localizer().takes_heading() &&
-       parameters_.localization.imu_orientation.imu_heading != ImuHeadingUse::kNone)) {
+  if (pipeline_.takes_imu()) {
     add(io_.subscribe<Imu>(
         node, topics::kImu, 1000, [this](const auto& m) { on_imu(*m); }, kNoDelay));
   }

@@ -4,6 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "urban_gnss_localization/geometry/pose_faults.hpp"
+
 namespace urban_gnss {
 namespace {
 
@@ -20,9 +22,6 @@ geometry_msgs::Point to_point(const Eigen::Vector3d& position) {
 }
 
 Eigen::Vector3d to_vector(const geometry_msgs::Point& point) { return {point.x, point.y, point.z}; }
-
-/// Of a point from which a robot's place can come, as an odometry's.
-constexpr double kMaxCoordinate_m = 1e7;
 
 std::string joined(const std::vector<std::string>& faults) {
   std::string text;

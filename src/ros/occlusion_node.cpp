@@ -39,7 +39,7 @@ OcclusionNode::OcclusionNode(ros::NodeHandle& node, ros::NodeHandle& private_nod
   marker_publisher_ = node.advertise<visualization_msgs::MarkerArray>(topics::kVisibilityMarkers, 2);
   sky_publisher_ = node.advertise<sensor_msgs::Image>(topics::kSkyPlot, 2);
   map_publisher_ = node.advertise<sensor_msgs::PointCloud2>(topics::kOcclusionMap, 1, true);
-  subscribe(node, settings.pipeline.imu_orientation.imu_heading != ImuHeadingUse::kNone);
+  subscribe(node, settings.pipeline.imu_orientation.is_used());
   clear_service_ = io_.serve<std_srvs::Trigger::Request, std_srvs::Trigger::Response>(
       private_node, "clear_map", [this](auto&, auto& response) { clear_map(response); });
   using urban_gnss_localization::SaveMap;
@@ -133,21 +133,10 @@ std::string OcclusionNode::what_is_awaited() const {
 }
 
 /// A fix without a place: who listens shall see what the receiver says, but no numbers that are none.
-void OcclusionNode::pass_on(const sensor_msgs::NavSatFix& message) {
-  sensor_msgs::NavSatFix without_place = message;
-  without_place.status.status = std::min<std::int8_t>(message.status.status, sensor_msgs::NavSatStatus::STATUS_NO_FIX);
-  for (double* each : {&without_place.latitude, &without_place.longitude, &without_place.altitude}) {
-    if (!std::isfinite(*each)) *each = 0.0;
-  }
-  without_place.position_covariance.fill(0.0);
-  without_place.position_covariance_type = sensor_msgs::NavSatFix::COVARIANCE_TYPE_UNKNOWN;
-  publish_shared(io_, fix_publisher_, std::move(without_place));
-}
-
 /// `assessment`: null where there is nothing to weigh.
 void OcclusionNode::publish(const sensor_msgs::NavSatFixConstPtr& message, const FixAssessment* assessment) {
   if (assessment == nullptr) {
-    pass_on(*message);
+    publish_shared(io_, fix_publisher_, fix_without_place(*message));
     return;
   }
   const ros::Time stamp = message->header.stamp;

@@ -155,6 +155,17 @@ std::optional<Eigen::Matrix2d> claimed_covariance(const sensor_msgs::NavSatFix& 
   return is_usable ? std::optional<Eigen::Matrix2d>(claimed) : std::nullopt;
 }
 
+sensor_msgs::NavSatFix fix_without_place(const sensor_msgs::NavSatFix& fix) {
+  sensor_msgs::NavSatFix without_place = fix;
+  without_place.status.status = std::min<std::int8_t>(fix.status.status, sensor_msgs::NavSatStatus::STATUS_NO_FIX);
+  for (double* each : {&without_place.latitude, &without_place.longitude, &without_place.altitude}) {
+    if (!std::isfinite(*each)) *each = 0.0;
+  }
+  without_place.position_covariance.fill(0.0);
+  without_place.position_covariance_type = sensor_msgs::NavSatFix::COVARIANCE_TYPE_UNKNOWN;
+  return without_place;
+}
+
 sensor_msgs::NavSatFix weighted_fix(const sensor_msgs::NavSatFix& fix, const GnssCovariance& covariance) {
   sensor_msgs::NavSatFix weighted = fix;
   const Eigen::Matrix2d& horizontal = covariance.weighted;

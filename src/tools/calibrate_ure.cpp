@@ -77,8 +77,9 @@ Recording read(const ReplayOptions& options) {
     recording.velocities.insert(recording.velocities.end(), output.velocities.begin(), output.velocities.end());
     for (const SatelliteEpoch& epoch : output.satellites) recording.satellites[epoch.stamp] = epoch.satellites;
   }
-  const auto by_stamp = [](const RawFix& a, const RawFix& b) { return a.stamp < b.stamp; };
+  const auto by_stamp = [](const auto& a, const auto& b) { return a.stamp < b.stamp; };
   std::stable_sort(recording.fixes.begin(), recording.fixes.end(), by_stamp);
+  std::stable_sort(recording.velocities.begin(), recording.velocities.end(), by_stamp);
   if (recording.fixes.empty()) throw std::runtime_error(all.source + ": no fix with a position in this part");
   return recording;
 }

@@ -107,7 +107,7 @@ class CommandLine {
     return std::find(options.begin(), options.end(), option) != options.end();
   }
 
-  /// All values of options that are files or folders, also behind a `=`.
+  /// All values of options that are files, also behind a `=`.
   void find_inputs() {
     for (const CLI::Option* option : app_.get_options()) {
       if (has(outputs_, option) || has(output_folders_, option)) continue;

@@ -10,8 +10,9 @@ import unittest
 
 import yaml
 
-PROGRAMS = os.environ.get("URBAN_GNSS_PROGRAMS", "")
-PACKAGE = os.path.realpath(os.path.join(os.path.dirname(os.path.realpath(__file__)), "..", ".."))
+import programs
+from programs import PACKAGE, PROGRAMS
+
 DATA = os.environ.get("URBAN_GNSS_DATA", os.path.join(PACKAGE, "..", "shared", "data"))
 STATIC = os.path.join(DATA, "hk_tst_20200603_static")
 STANDING = """
@@ -24,10 +25,7 @@ route: {speed: 1, waypoints: [[0, 0], {at: [1, 0], stop: 2000}, [2, 0]]}
 
 
 def run(program, *arguments):
-    environment = dict(os.environ)
-    environment["ROS_PACKAGE_PATH"] = PACKAGE + ":" + environment.get("ROS_PACKAGE_PATH", "")
-    return subprocess.run([os.path.join(PROGRAMS, program), *map(str, arguments)], stdout=subprocess.PIPE,
-                          stderr=subprocess.PIPE, universal_newlines=True, env=environment, timeout=300)
+    return programs.run(program, *arguments, stderr=subprocess.PIPE)
 
 
 @unittest.skipUnless(PROGRAMS, "URBAN_GNSS_PROGRAMS is not set")

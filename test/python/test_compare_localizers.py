@@ -1,11 +1,12 @@
 """compare_localizers.py: its statistics and tables, and the whole of it with programs that only pretend."""
 import importlib.util
 import os
-import stat
 import subprocess
 import sys
 import tempfile
 import unittest
+
+import programs
 
 import numpy as np
 
@@ -40,10 +41,6 @@ else:
     open(sys.argv[sys.argv.index("--output") + 1], "w").close()
     with open(sys.argv[sys.argv.index("--json") + 1], "w") as file:
         json.dump({"errors": {"inside_95": 0.925, "position_nees_mean": 2.5, "beyond_protection": 0.001}}, file)
-"""
-CSV_TO_BAG = """#!/usr/bin/env python3
-import sys
-open(sys.argv[2], "w").close()
 """
 
 
@@ -85,11 +82,7 @@ class ProgramTest(unittest.TestCase):
         scratch = tempfile.TemporaryDirectory()
         self.addCleanup(scratch.cleanup)
         self.directory = scratch.name
-        for name, text in (("evaluate", EVALUATE), ("replay", REPLAY), ("csv_to_bag", CSV_TO_BAG)):
-            path = os.path.join(self.directory, name)
-            with open(path, "w") as file:
-                file.write(text)
-            os.chmod(path, os.stat(path).st_mode | stat.S_IXUSR)
+        programs.pretend(self.directory, evaluate=EVALUATE, replay=REPLAY, csv_to_bag=programs.CSV_TO_BAG)
         for recording, files in (("one", compare.NEEDED), ("two", compare.NEEDED), ("no_truth", ("gnss.csv",))):
             folder = os.path.join(self.directory, "data", recording)
             os.makedirs(folder)

@@ -2,11 +2,12 @@
 import importlib.util
 import json
 import os
-import stat
 import subprocess
 import sys
 import tempfile
 import unittest
+
+import programs
 
 SCRIPTS = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "reports")
 SCRIPT = os.path.join(SCRIPTS, "compare_starts.py")
@@ -24,10 +25,6 @@ if start == 0.0:
 with open(sys.argv[sys.argv.index("--json") + 1], "w") as file:
     json.dump({"errors": {"inside_95": 0.8 + start / 1000.0}, "time_to_start_s": 4.0, "time_to_heading_s": None}, file)
 """
-CSV_TO_BAG = """#!/usr/bin/env python3
-import sys
-open(sys.argv[2], "w").close()
-"""
 
 
 class StartsTest(unittest.TestCase):
@@ -41,11 +38,7 @@ class StartsTest(unittest.TestCase):
 
     def test_counts_and_writes_the_table(self):
         with tempfile.TemporaryDirectory() as directory:
-            for name, text in (("replay", REPLAY), ("csv_to_bag", CSV_TO_BAG)):
-                path = os.path.join(directory, name)
-                with open(path, "w") as file:
-                    file.write(text)
-                os.chmod(path, os.stat(path).st_mode | stat.S_IXUSR)
+            programs.pretend(directory, replay=REPLAY, csv_to_bag=programs.CSV_TO_BAG)
             folder = os.path.join(directory, "data", "drive")
             os.makedirs(folder)
             for file in ("gnss.csv", "truth.csv", "meta.json"):

@@ -1,11 +1,12 @@
 """leave_one_out.py: what a drive is, that the drive left out has no say, and the whole of it with a pretended replay."""
 import importlib.util
 import os
-import stat
 import subprocess
 import sys
 import tempfile
 import unittest
+
+import programs
 
 SCRIPTS = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "reports")
 SCRIPT = os.path.join(SCRIPTS, "leave_one_out.py")
@@ -21,10 +22,6 @@ shares = [float(text.split("=")[1]) for text in sys.argv if "common_error_share"
 with open(sys.argv[sys.argv.index("--json") + 1], "w") as file:
     json.dump({"errors": {"position_m": {"median": 1.0 + sum(shares), "p95": 3.0}, "inside_95": 0.9,
                           "position_nees_mean": 2.0}}, file)
-"""
-CSV_TO_BAG = """#!/usr/bin/env python3
-import sys
-open(sys.argv[2], "w").close()
 """
 
 
@@ -54,11 +51,7 @@ class LeaveOneOutTest(unittest.TestCase):
 
     def test_writes_the_table(self):
         with tempfile.TemporaryDirectory() as directory:
-            for name, text in (("replay", REPLAY), ("csv_to_bag", CSV_TO_BAG)):
-                path = os.path.join(directory, name)
-                with open(path, "w") as file:
-                    file.write(text)
-                os.chmod(path, os.stat(path).st_mode | stat.S_IXUSR)
+            programs.pretend(directory, replay=REPLAY, csv_to_bag=programs.CSV_TO_BAG)
             for name in ("one", "two"):
                 folder = os.path.join(directory, "data", name)
                 os.makedirs(folder)

@@ -5,23 +5,15 @@ URBAN_GNSS_PROGRAMS names the folder of the programs."""
 import filecmp
 import json
 import os
-import subprocess
 import tempfile
 import unittest
 
 import rosbag
 
-PROGRAMS = os.environ.get("URBAN_GNSS_PROGRAMS", "")
-PACKAGE = os.path.realpath(os.path.join(os.path.dirname(os.path.realpath(__file__)), "..", ".."))
+from programs import PACKAGE, PROGRAMS, run
+
 SMALL_LIDAR = ("--set", "lidar.points_per_revolution=120", "--set", "lidar.beams=8")
 SIMULATOR = ("--occlusion-params", os.path.join(PACKAGE, "config", "occlusion_simulator.yaml"))
-
-
-def run(program, *arguments):
-    environment = dict(os.environ)
-    environment["ROS_PACKAGE_PATH"] = PACKAGE + ":" + environment.get("ROS_PACKAGE_PATH", "")
-    return subprocess.run([os.path.join(PROGRAMS, program), *map(str, arguments)], stdout=subprocess.PIPE,
-                          stderr=subprocess.STDOUT, universal_newlines=True, env=environment, timeout=300)
 
 
 @unittest.skipUnless(PROGRAMS, "URBAN_GNSS_PROGRAMS is not set")

@@ -6,7 +6,6 @@ import filecmp
 import json
 import math
 import os
-import subprocess
 import tempfile
 import unittest
 
@@ -14,8 +13,9 @@ import rosbag
 import sensor_msgs.point_cloud2 as point_cloud2
 from sensor_msgs.msg import NavSatFix, NavSatStatus
 
-PROGRAMS = os.environ.get("URBAN_GNSS_PROGRAMS", "")
-PACKAGE = os.path.realpath(os.path.join(os.path.dirname(os.path.realpath(__file__)), "..", ".."))
+import programs
+from programs import PROGRAMS
+
 SENSORS = {"/odom": "nav_msgs/Odometry", "/imu/data": "sensor_msgs/Imu", "/gps/fix": "sensor_msgs/NavSatFix",
            "/gps/velocity": "geometry_msgs/TwistWithCovarianceStamped",
            "/gps/satellites": "urban_gnss_localization/SatelliteArray", "/points": "sensor_msgs/PointCloud2",
@@ -26,10 +26,7 @@ SMALL_LIDAR = ["--set", "lidar.points_per_revolution=60", "--set", "lidar.beams=
 
 
 def run(*arguments):
-    environment = dict(os.environ)
-    environment["ROS_PACKAGE_PATH"] = PACKAGE + ":" + environment.get("ROS_PACKAGE_PATH", "")
-    return subprocess.run([os.path.join(PROGRAMS, "simulate"), *map(str, arguments)], stdout=subprocess.PIPE,
-                          stderr=subprocess.STDOUT, universal_newlines=True, env=environment, timeout=300)
+    return programs.run("simulate", *arguments)
 
 
 @unittest.skipUnless(PROGRAMS, "URBAN_GNSS_PROGRAMS is not set")

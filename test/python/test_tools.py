@@ -7,25 +7,17 @@ import filecmp
 import json
 import math
 import os
-import subprocess
 import tempfile
 import unittest
 
 import rosbag
 
-PROGRAMS = os.environ.get("URBAN_GNSS_PROGRAMS", "")
-PACKAGE = os.path.realpath(os.path.join(os.path.dirname(os.path.realpath(__file__)), "..", ".."))
+from programs import PACKAGE, PROGRAMS, run
+
 RANDOM = ("--localizer", "particle_filter")  # the localizer that a seed matters to
 DATA = os.environ.get("URBAN_GNSS_DATA", os.path.join(PACKAGE, "..", "shared", "data"))
 ZONE_KEYS = {"position_rmse_m", "position_p95_m", "position_max_m", "heading_rmse_rad"}
 METRES_A_DEGREE = 111194.0  # of latitude, at 45 degrees; good to a part in a thousand
-
-
-def run(program, *arguments):
-    environment = dict(os.environ)
-    environment["ROS_PACKAGE_PATH"] = PACKAGE + ":" + environment.get("ROS_PACKAGE_PATH", "")
-    return subprocess.run([os.path.join(PROGRAMS, program), *map(str, arguments)], stdout=subprocess.PIPE,
-                          stderr=subprocess.STDOUT, universal_newlines=True, env=environment, timeout=300)
 
 
 def write_csv(path, header, rows):

@@ -25,7 +25,7 @@ struct TimedPosition {
 
 /// The longest part of a recording in which the receiver stands still: its velocities say so (the median of 10 s is
 /// below 0.3 m/s), or where it has none, the mean of the fixes of 5 s moves by less than 3 m to that of the next 5 s.
-/// And in the whole of it the mean of 5 s stays within 10 m of where it began. Requires fixes in the order of their
+/// And in the whole of it the mean of 5 s stays within 10 m of where it began. Requires both in the order of their
 /// stamps; nothing where there are none.
 std::optional<StationaryPart> longest_stationary_part(const std::vector<TimedPosition>& fixes,
                                                       const std::vector<RawVelocity>& velocities);

@@ -22,6 +22,8 @@ struct ImuHeadingParameters {
   double imu_heading_offset{0.0};
   double imu_heading_sigma{0.2};
 
+  bool is_used() const { return imu_heading != ImuHeadingUse::kNone; }
+
   void visit(ParameterVisitor& v) {
     v("imu_heading", imu_heading,
       "use of the heading in imu/data's orientation; none: not used; learnt: once its offset is known from other "

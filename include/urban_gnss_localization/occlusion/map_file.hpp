@@ -10,8 +10,8 @@ namespace urban_gnss {
 /// is not there, or the file is and `overwrite` is not set, or is no ordinary file. Empty where one may.
 std::string map_file_fault(const std::string& path, bool overwrite);
 
-/// Writes the map as a binary .pcd file: beside the file first, so that the old one stays until the new one is whole.
-/// Throws std::runtime_error with map_file_fault(), or where it cannot be written.
+/// Writes the map as write_pcd() does, whole or not at all. Throws std::runtime_error with map_file_fault(), or where
+/// it cannot be written.
 void save_map_file(const std::string& path, const PointCloud& map, bool overwrite);
 
 }  // namespace urban_gnss

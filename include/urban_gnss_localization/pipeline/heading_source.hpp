@@ -16,7 +16,7 @@ class HeadingSource {
   /// Requires parameters without faults.
   explicit HeadingSource(const ImuHeadingParameters& parameters) : parameters_(parameters), calibration_(parameters) {}
 
-  bool is_used() const { return parameters_.imu_heading != ImuHeadingUse::kNone; }
+  bool is_used() const { return parameters_.is_used(); }
 
   /// As the IMU says it. One that is not finite, or late by up to a second, is left out; an older one begins anew.
   void add(const HeadingSample& told);

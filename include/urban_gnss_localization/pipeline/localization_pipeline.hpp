@@ -67,6 +67,10 @@ class LocalizationPipeline {
   /// The IMU's heading, of the robot. With a stamp far ahead of the odometry it is left out.
   void add_imu_heading(const HeadingSample& heading);
   void add_fix(const RawFix& fix);
+  /// Whether an IMU changes anything: its yaw rate, or its heading.
+  bool takes_imu() const {
+    return parameters_.imu.use_imu_yaw_rate || (localizer_->takes_heading() && parameters_.imu_orientation.is_used());
+  }
   /// Whether velocities of the receiver change anything: where they are wanted, and the localizer makes use of them.
   bool takes_velocity() const {
     return parameters_.velocity.use_gps_velocity && (localizer_->takes_velocity() || parameters_.speed.check_wheels);
@@ -178,8 +182,9 @@ class LocalizationPipeline {
   Stamp undelayed(Stamp stamp) const { return stamp - from_seconds(delay_.delay_s()); }
   /// Where the antenna was at `stamp` (m, map frame), by the estimate now; nothing outside the odometry's history.
   std::optional<Eigen::Vector2d> predicted_antenna(Stamp stamp) const;
-  /// Whether the estimate is one; otherwise the filter is started anew from the fixes.
-  bool guard_state(const PoseEstimate& estimate);
+  /// Whether there is no fault (pose_fault(), estimate_fault()) of what the filter says; otherwise it is started anew
+  /// from the fixes.
+  bool guard_state(const std::string& fault);
 
   void decide_stale(FixOutcome outcome, const std::string& reason);
   void decide(FixOutcome outcome);

@@ -45,7 +45,6 @@ class OcclusionNode {
   void every_second();
   void every_five_seconds();
   std::string what_is_awaited() const;
-  void pass_on(const sensor_msgs::NavSatFix& message);
   void publish(const sensor_msgs::NavSatFixConstPtr& message, const FixAssessment* assessment);
   void publish_map();
   void clear_map(std_srvs::Trigger::Response& response);

@@ -39,6 +39,9 @@ std::optional<Eigen::Matrix2d> claimed_covariance(const sensor_msgs::NavSatFix& 
 /// as the horizontal ones.
 sensor_msgs::NavSatFix weighted_fix(const sensor_msgs::NavSatFix& fix, const GnssCovariance& covariance);
 
+/// The fix as one without a place: no status, nothing non-finite, no covariance.
+sensor_msgs::NavSatFix fix_without_place(const sensor_msgs::NavSatFix& fix);
+
 urban_gnss_localization::Visibility to_message(const FixAssessment& assessment,
                                                const std::optional<Eigen::Matrix2d>& claimed,
                                                const GnssCovarianceParameters& parameters, const ros::Time& time,

@@ -88,7 +88,7 @@ void OcclusionStage::work() {
 
 void OcclusionStage::settle(const sensor_msgs::NavSatFix& message, const FixAssessment* assessment) {
   if (assessment == nullptr) {
-    settled_.push_back({message, std::nullopt});
+    settled_.push_back({fix_without_place(message), std::nullopt});
     return;
   }
   const auto claimed = claimed_covariance(message);
