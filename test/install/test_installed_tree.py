@@ -22,8 +22,9 @@ class InstalledTreeTest(unittest.TestCase):
         environment = {"HOME": self.directory, "PATH": "/usr/bin:/bin", "LANG": "C.UTF-8", "ROS_HOME": self.directory,
                        "ROS_HOSTNAME": "localhost"}
         ros = "/opt/ros/noetic/setup.bash"
-        source = ". {} && ".format(ros) if os.path.exists(ros) else ""
-        done = subprocess.run(["bash", "-c", source + ". {}/setup.bash && ".format(INSTALL) + command],
+        source = ". {}\n".format(ros) if os.path.exists(ros) else ""
+        # By lines: of `. setup.bash && roslaunch &` $! would be a shell, and the nodes outlive it.
+        done = subprocess.run(["bash", "-c", source + ". {}/setup.bash\n".format(INSTALL) + command],
                               stdout=subprocess.PIPE, stderr=subprocess.STDOUT, universal_newlines=True,
                               env=environment, cwd=self.directory, timeout=seconds)
         self.assertEqual(done.returncode, 0, command + "\n" + done.stdout)
