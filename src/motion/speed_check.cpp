@@ -29,9 +29,9 @@ constexpr double kSlow_mps = 1.0;
 constexpr double kTurn_s = 3.0;
 
 /// For which a fault must last; `ratio` of the receiver's speed to the odometry's.
-double least_time_s(SpeedFault fault, double ratio, bool odometry_jumped) {
+double least_time_s(SpeedFault fault, double ratio, bool odometry_jumped, bool is_by_fixes) {
   switch (fault) {
-    case SpeedFault::kNone: return 1.5;
+    case SpeedFault::kNone: return is_by_fixes ? 6.0 : 1.5;
     case SpeedFault::kReversed: return 1.5;
     case SpeedFault::kDead: return 4.0;
     case SpeedFault::kScaled: {
@@ -108,7 +108,7 @@ SpeedFault SpeedCheck::add(const SpeedPair& pair) {
     ratio_ += std::max(kRatioRate, 1.0 / ++count_) * (pair.receiver_mps / pair.odometry_mps - ratio_);
   }
   last_ = pair;
-  if (run_ && run_s() >= least_time_s(*run_, ratio_, odometry_jumped_)) fault_ = *run_;
+  if (run_ && run_s() >= least_time_s(*run_, ratio_, odometry_jumped_, pair.is_by_fixes)) fault_ = *run_;
   return fault_;
 }
 

@@ -18,10 +18,17 @@ namespace {
 
 /// Standard deviation below which a heading tells forwards from backwards.
 constexpr double kKnownHeading_rad = 0.15;
+/// The same once the fixes contradict the odometry: by its error the robot seems to move sideways, which counts as
+/// theirs.
+constexpr double kRoughHeading_rad = 0.5;
 /// Share of a speed over ground by which the robot moves sideways.
 constexpr double kSideways = 0.1;
 /// Standard deviation of the heading after turns by a rate that was not the robot's.
 constexpr double kWrongTurns_rad = 1.0;
+/// Without a velocity of the receiver, after which its fixes tell the speed.
+constexpr double kNoVelocity_s = 5.0;
+
+bool is_sideways(const Twist2& twist, double speed_mps) { return std::abs(twist.lateral_mps) > kSideways * speed_mps; }
 
 }  // namespace
 
@@ -88,6 +95,7 @@ void LocalizationPipeline::forget_odometry(double gap_s) {
   event(Level::kWarn, "no odometry for " + seconds_text(gap_s) +
                           (initialized() ? ": place unknown, starting anew from the fixes" : ""));
   history_.clear();
+  fix_speed_ = {};
   delay_.forget_odometry();
   ++epoch_;
   start_.lose_place();
@@ -180,20 +188,39 @@ void LocalizationPipeline::process_velocity(const RawVelocity& velocity) {
   guard_state(estimate_fault(localizer_->estimate()));
 }
 
+bool LocalizationPipeline::knows_heading(double sigma_rad) const {
+  return initialized() && localizer_->health().heading_sigma_rad < sigma_rad;
+}
+
+void LocalizationPipeline::compare_speed(const LocalFix& fix) {
+  const Stamp stamp = undelayed(fix.stamp);
+  const bool has_velocities = compared_velocity_ && to_seconds(stamp - *compared_velocity_) < kNoVelocity_s;
+  const bool has_direction = knows_heading(speed_.is_wrong() ? kRoughHeading_rad : kKnownHeading_rad);
+  // Without a heading, what the fixes move sideways does not show: that suffices for a fault's end only.
+  if (has_velocities || !(has_direction || speed_.is_wrong())) {
+    fix_speed_ = {};
+    return;
+  }
+  std::optional<double> path_yaw;
+  if (has_direction) path_yaw = localizer_->pose().yaw - history_.pose_at(history_.latest())->yaw;
+  const auto speed = fix_speed_.add(stamp, fix.position, history_, path_yaw, antenna_);
+  if (speed && !is_sideways(*history_.twist_at(stamp), speed->speed_mps)) speed_.compare(*speed, events_);
+}
+
 void LocalizationPipeline::compare_speed(const MatchedVelocity& velocity) {
+  compared_velocity_ = velocity.pair.stamp;
   const Eigen::Vector2d& measured = velocity.measurement.velocity;
-  const double lateral_mps = history_.twist_at(velocity.pair.stamp)->lateral_mps;
-  const bool is_sideways = std::abs(lateral_mps) > kSideways * measured.norm();
+  const bool moves_sideways = is_sideways(*history_.twist_at(velocity.pair.stamp), measured.norm());
   ReceiverSpeed speed;
   speed.stamp = velocity.pair.stamp;
   speed.speed_mps = measured.norm();
   speed.sigma_mps = std::sqrt(0.5 * velocity.measurement.covariance.trace());
-  if (initialized() && localizer_->health().heading_sigma_rad < kKnownHeading_rad) {
+  if (knows_heading(kKnownHeading_rad)) {
     const double turned = velocity.pair.yaw_rad - history_.pose_at(history_.latest())->yaw;
     const double yaw = localizer_->pose().yaw + turned;
     speed.forward_mps = measured.x() * std::cos(yaw) + measured.y() * std::sin(yaw);
-    if (is_sideways) speed.speed_mps = std::abs(*speed.forward_mps);
-  } else if (is_sideways) {
+    if (moves_sideways) speed.speed_mps = std::abs(*speed.forward_mps);
+  } else if (moves_sideways) {
     return;  // how much of it is forwards is not known
   }
   speed_.compare(speed, events_);

@@ -54,6 +54,8 @@ void LocalizationPipeline::reset(const std::string& why) {
   yaw_rate_.reset();
   heading_.reset();
   speed_.reset();
+  fix_speed_ = {};
+  compared_velocity_.reset();
   velocities_.reset();
   fixes_.reset();
   delay_.reset();
@@ -190,6 +192,7 @@ bool LocalizationPipeline::process_next_fix() {
     start_with(fix);
     return true;
   }
+  compare_speed(fix.fix);
   const std::optional<BiasEstimate> bias = take_bias(fix.fix.stamp);
   const bool restarts = restart_with(fix);
   compare_heading();

@@ -162,6 +162,28 @@ TEST(LocalizationMotion, VelocitiesTellOfTheWheelsWhereTheLocalizerDoesNotTakeTh
   EXPECT_GT(rig.fake->doubted.position_m2, 0.0);
 }
 
+// A receiver behind a driver that publishes no velocity: its fixes see the wheels stand, too.
+TEST(LocalizationMotion, FixesTellOfTheWheelsWhereThereIsNoVelocity) {
+  for (const bool has_velocity : {false, true}) {
+    Rig rig("{datum: [33.0, 130.0, 20.0], initial_pose: [0.0, 0.0, 0.0], initial_heading_sigma: 0.1}");
+    for (int k = 0; k <= 200; ++k) {
+      OdometrySample sample = Rig::odometry(0.1 * k);
+      sample.has_pose = false;
+      if (k > 100) sample.twist.speed_mps = 0.0;
+      rig.pipeline.add_odometry(sample);
+      if (k % 10 != 0) continue;
+      if (has_velocity) {  // and believes the wheels, whatever the fixes say
+        RawVelocity velocity = Rig::velocity(0.1 * k);
+        if (k > 100) velocity.velocity.setZero();
+        rig.pipeline.add_velocity(velocity);
+      }
+      rig.fix(0.1 * k);
+    }
+    EXPECT_EQ(rig.fake->moves.back().first.speed_mps > 1.5, !has_velocity);
+    EXPECT_EQ(rig.fake->doubted.position_m2 > 0.0, !has_velocity);
+  }
+}
+
 TEST(LocalizationMotion, VelocitiesTellTheHeadingWithinSeconds) {
   double with_error = kNaN;
   double without_error = kNaN;

@@ -224,5 +224,50 @@ TEST(SpeedSource, ReceiverAheadOfAllOdometryIsNotCompared) {
   EXPECT_TRUE(drive.events.empty());
 }
 
+/// A second of odometry at 10 Hz, and the speed by fixes at its end.
+double second_beside_fixes(Drive& drive, double odometry_mps, double fixes_mps, double sigma_mps = 0.1) {
+  for (int k = 0; k < 9; ++k) drive.step(odometry_mps);
+  const double speed_mps = drive.step(odometry_mps);
+  drive.source.compare({from_seconds(kStep_s * drive.steps), std::abs(fixes_mps), fixes_mps, sigma_mps, 3.0},
+                       drive.events);
+  return speed_mps;
+}
+
+TEST(SpeedSource, FixesTakeThePlaceOfADeadEncoder) {
+  Drive drive;
+  for (int k = 0; k < 10; ++k) second_beside_fixes(drive, 1.0, 1.0);
+  for (int k = 0; k < 9; ++k) second_beside_fixes(drive, 0.0, 1.0);
+  EXPECT_TRUE(contains(drive.source.complaint(), "the fixes 1.0 m/s: a dead encoder?")) << drive.source.complaint();
+  EXPECT_NEAR(second_beside_fixes(drive, 0.0, 1.0), 1.0, 0.05);
+  EXPECT_GT(drive.source.doubt_m2(), 0.0);
+  for (int k = 0; k < 7; ++k) {
+    second_beside_fixes(drive, 1.0, 1.0);
+    EXPECT_NE(drive.source.complaint(), "") << k;
+  }
+  for (int k = 0; k < 4; ++k) second_beside_fixes(drive, 1.0, 1.0);
+  EXPECT_EQ(drive.source.complaint(), "") << "after 6 s of agreement, and 3 s that the means need";
+}
+
+TEST(SpeedSource, FixesThatScatterTellNothing) {
+  Drive drive;
+  for (int k = 0; k < 60; ++k) {
+    EXPECT_EQ(second_beside_fixes(drive, 1.0, 3.0, 0.6), 1.0) << "a reflection";
+    EXPECT_EQ(drive.source.complaint(), "");
+  }
+  for (int k = 0; k < 10; ++k) second_beside_fixes(drive, 0.447, 1.0);
+  ASSERT_NE(drive.source.complaint(), "");
+  for (int k = 0; k < 20; ++k) second_beside_fixes(drive, 0.447, 0.447, 0.3);
+  EXPECT_NE(drive.source.complaint(), "") << "nor do they end a fault";
+}
+
+TEST(SpeedSource, OdometryIsComparedByItsMeanOverTheTimeOfTheFixes) {
+  Drive drive;
+  for (int k = 0; k < 60; ++k) {
+    for (int i = 0; i < 10; ++i) drive.step(i % 2 * 2.0);
+    drive.source.compare({from_seconds(kStep_s * drive.steps), 1.0, 1.0, 0.1, 3.0}, drive.events);
+    EXPECT_EQ(drive.source.complaint(), "");
+  }
+}
+
 }  // namespace
 }  // namespace urban_gnss

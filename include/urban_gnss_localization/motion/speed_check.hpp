@@ -21,6 +21,7 @@ struct SpeedPair {
   double receiver_mps{0.0};
   double receiver_sigma_mps{0.0};
   bool odometry_jumped{false};  ///< since the pair before, in one step, by a share that no robot is likely to
+  bool is_by_fixes{false};      ///< means of some seconds
 };
 
 /// Compares an odometry's speed with the receiver's for what goes wrong with wheels. A reflection can spoil a
@@ -28,7 +29,8 @@ struct SpeedPair {
 /// long as no reflection keeps that pattern: 1.5 s reversed, 4 s dead or scaled by 1.8 and more, 10 s scaled by less; a
 /// scale half as long where it began with a jump of the odometry. The receiver's speed, or its mean ratio to the
 /// odometry's, must be steady, and no robot turns back without a stop, unless it is the odometry whose sign changes. A
-/// fault ends once both agree for 1.5 s while the robot moves. A silence of 2.5 s begins anew.
+/// fault ends once both agree for 1.5 s while the robot moves, by fixes for 6 s. A silence of
+/// 2.5 s begins anew.
 class SpeedCheck {
  public:
   /// The fault as of this pair; stamps ascend.

@@ -12,6 +12,7 @@
 #include "urban_gnss_localization/pipeline/bias_matcher.hpp"
 #include "urban_gnss_localization/pipeline/epoch_matcher.hpp"
 #include "urban_gnss_localization/pipeline/fix_queue.hpp"
+#include "urban_gnss_localization/pipeline/fix_speed.hpp"
 #include "urban_gnss_localization/pipeline/heading_source.hpp"
 #include "urban_gnss_localization/pipeline/input_clocks.hpp"
 #include "urban_gnss_localization/pipeline/localization_parameters.hpp"
@@ -171,7 +172,11 @@ class LocalizationPipeline {
   void check_residuals(std::vector<SatelliteObservation>& satellites);
   /// Which sources contradict each other; empty where none do.
   std::string complaint() const;
+  /// Whether the heading is known to `sigma_rad`.
+  bool knows_heading(double sigma_rad) const;
   void compare_speed(const MatchedVelocity& velocity);
+  /// The same by fixes, where there are no velocities.
+  void compare_speed(const LocalFix& fix);
   void watch_integrity(const ValidatedFix& fix, const Eigen::Vector2d& antenna_in_body);
   std::optional<BiasEstimate> take_bias(Stamp fix);
   void correct_with(const ValidatedFix& fix);
@@ -208,6 +213,8 @@ class LocalizationPipeline {
   YawRateSource yaw_rate_;
   HeadingSource heading_;
   SpeedSource speed_;
+  FixSpeed fix_speed_;
+  std::optional<Stamp> compared_velocity_;  ///< the receiver's last one
   VelocityQueue velocities_;
   FixQueue fixes_;
   FixDelayEstimator delay_;

@@ -25,17 +25,19 @@ struct SpeedParameters {
   }
 };
 
-/// The speed at one time by the receiver's velocity.
+/// The speed by the receiver: at one time by its velocity, or the mean of some time by its fixes.
 struct ReceiverSpeed {
-  Stamp stamp{0};
+  Stamp stamp{0};                       ///< of the end
   double speed_mps{0.0};                ///< >= 0
   std::optional<double> forward_mps{};  ///< in the direction of the heading, where that is known
   double sigma_mps{0.0};
+  double duration_s{0.0};  ///< 0: by the velocity
 };
 
 /// Where the forward speed comes from: the odometry, until SpeedCheck finds it wrong; then the receiver's velocity,
 /// until both agree again. Where the receiver is silent it is the odometry's all the same, with the sign that was
-/// found. While both contradict each other, and while the receiver's is used, there is a doubt.
+/// found. While both contradict each other, and while the receiver's is used, there is a doubt. The speed by fixes is
+/// filtered, for a reflection spoils them for seconds.
 class SpeedSource {
  public:
   /// Requires parameters without faults.
@@ -68,8 +70,19 @@ class SpeedSource {
     Stamp stamp;
     double mps;
   };
+  struct FilteredSpeed {
+    Stamp stamp;
+    double mps;
+    double variance;  ///< (m/s)^2
+  };
   /// By the odometry, whatever is believed of it; nothing outside of what is remembered.
   std::optional<double> odometry_at(Stamp stamp) const;
+  /// The mean over the time of the receiver's speed.
+  std::optional<double> odometry_beside(const ReceiverSpeed& receiver) const;
+  /// The filtered speed by fixes takes the pair into account.
+  void filter(const SpeedPair& pair);
+  /// The receiver's speed, m/s.
+  double receiver_mps() const { return is_by_fixes_ ? by_fixes_->mps : pair_.receiver_mps; }
   /// The speed that is believed.
   double believed_mps(double odometry_mps, Stamp stamp, double duration_s, std::vector<PipelineEvent>& events);
   /// m^2 per axis, of a step at the believed speed.
@@ -91,6 +104,8 @@ class SpeedSource {
   bool has_agreed_{false};                 ///< with the heading's sign, while it moved
   SpeedPair shown_;                        ///< that showed the fault
   SpeedPair pair_;                         ///< that was compared last
+  bool is_by_fixes_{false};                ///< the receiver's newest speed
+  std::optional<FilteredSpeed> by_fixes_;
   bool is_contradicted_{false};            ///< by another sensor than the receiver
   LastingDoubt doubt_;
   double doubt_m2_{0.0};

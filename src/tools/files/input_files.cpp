@@ -9,6 +9,12 @@ namespace urban_gnss {
 
 namespace fs = std::filesystem;
 
+namespace {
+
+constexpr std::size_t kMostNamed = 5;
+
+}  // namespace
+
 void InputFiles::add_file(const fs::path& path) {
   struct stat status {};
   if (stat(path.c_str(), &status) != 0 || !S_ISREG(status.st_mode)) return;
@@ -29,6 +35,16 @@ const fs::path& InputFiles::checked(const fs::path& output) const {
   const auto found = files_.find({status.st_dev, status.st_ino});
   if (found == files_.end()) return output;
   throw std::runtime_error(output.string() + ": is not written, for it is the file that is read as " + found->second);
+}
+
+std::string InputFiles::unless_named_in(const std::string& text) const {
+  std::string names;
+  std::size_t count = 0;
+  for (const auto& [identity, path] : files_) {
+    if (text.find(fs::path(path).filename().string()) != std::string::npos) return {};
+    if (count++ < kMostNamed) names += (names.empty() ? "" : ", ") + path;
+  }
+  return names.empty() ? "" : " (read: " + names + (count > kMostNamed ? ", …)" : ")");
 }
 
 const fs::path& prepared(const fs::path& output, const InputFiles& inputs) {

@@ -19,6 +19,8 @@ class InputFiles {
   void add_file(const std::filesystem::path& path);
   /// `output`. Throws std::runtime_error that names both where it is one of the files.
   const std::filesystem::path& checked(const std::filesystem::path& output) const;
+  /// For an error that names none of the files: " (read: a.bag, b.yaml)", five at most. Empty where it names one.
+  std::string unless_named_in(const std::string& text) const;
 
  private:
   std::map<std::pair<dev_t, ino_t>, std::string> files_;
