@@ -6,6 +6,7 @@ PASS, WARN, FAIL = "PASS", "WARN", "FAIL"
 LEVELS = (PASS, WARN, FAIL)
 
 # `check`: family.name; `text`: one sentence with the numbers; `change`: lines to write or type; `values`: the numbers.
+# The value `spans`, where there is one: (begin, end) of each time that is meant, s as in the stamps.
 Finding = namedtuple("Finding", "check level text change values")
 
 

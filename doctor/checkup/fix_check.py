@@ -175,15 +175,14 @@ def frozen(evidence):
     t, q, _ = evidence.fixes
     same = np.concatenate([[False], np.abs(np.diff(q)) < 1e-6])
     edges = np.flatnonzero(np.diff(np.concatenate([[0], same.astype(int), [0]])))
-    total, first = 0.0, None
+    spans = []
     for begin, end in zip(edges[::2], edges[1::2]):
-        span = t[end - 1] - t[begin - 1]
-        if span > FROZEN_S and track.way_at(t[end - 1]) - track.way_at(t[begin - 1]) > LEAST_WAY_M:
-            total += span
-            first = t[begin - 1] if first is None else first
-    if total == 0.0:
+        if t[end - 1] - t[begin - 1] > FROZEN_S and track.way_at(t[end - 1]) - track.way_at(t[begin - 1]) > LEAST_WAY_M:
+            spans.append((t[begin - 1], t[end - 1]))
+    if not spans:
         return []
+    total = sum(end - begin for begin, end in spans)
     return [warned("fix.frozen",
                    "{}: the same place for {:.0f} s in all while the robot drives (from {:.0f} s on)".format(
-        evidence.recording.fix.topic, total, first - evidence.recording.begin),
-        "in the driver: a message for each solution, status -1 where there is none", frozen_s=total)]
+        evidence.recording.fix.topic, total, spans[0][0] - evidence.recording.first_stamp()),
+        "in the driver: a message for each solution, status -1 where there is none", frozen_s=total, spans=spans)]

@@ -12,7 +12,13 @@ from .text import FAMILIES, ordered_families, summary
 
 DPI = 100
 MOST_POINTS = 4000     # of a line
-ODOMETRY, IMU, RECEIVER, FIX = "#0072b2", "#7b4fd6", "#d55e00", "#b08d57"
+WIDTH_IN = 11.0        # of a figure: the page's
+# Told apart by people who see colours differently, too (Okabe and Ito).
+COLOURS = {"odometry": "#56b4e9", "imu": "#222222", "velocity": "#d55e00", "fix": "#d55e00"}
+RATE_COLOURS = dict(COLOURS, velocity="#cc79a7", satellites="#009e73")  # of the receiver's streams, side by side
+LEVEL_COLOURS = {"WARN": "#e6b800", "FAIL": "#c1121f"}
+BIN_S = 5.0            # of the messages' rates
+LEAST_SHOWN = 0.004    # of the whole time: the width of a shorter mark
 STYLE = """
 body { font-family: sans-serif; color: #222; max-width: 70em; margin: 2em auto; padding: 0 1em; }
 h1 { font-size: 1.5em; } h2 { font-size: 1.2em; margin-top: 1.8em; border-bottom: 1px solid #ccc; }
@@ -21,7 +27,7 @@ td { padding: 0.3em 0.6em; border-bottom: 1px solid #e4e4e4; vertical-align: top
 td.level { font-weight: bold; width: 3.5em; }
 code { display: block; color: #333; background: #f5f5f5; padding: 0.1em 0.4em; }
 .PASS { color: #1a7f37; } .WARN { color: #9a6700; } .FAIL { color: #c1121f; }
-img { max-width: 100%; }
+img { width: 100%; }
 """
 
 
@@ -43,7 +49,6 @@ def plot_tracks(axes, evidence):
     """Fixes, and the odometry's track laid over them."""
     if evidence.fixes is not None:
         t, q, _ = evidence.fixes
-        axes.plot(*thin(q.real, q.imag), ".", color=FIX, markersize=2.5, label="fixes")
         track = evidence.track()
         if track is not None and len(t) >= fits.LEAST_POINTS:
             inside = (t >= track.t[0]) & (t <= track.t[-1])
@@ -52,15 +57,16 @@ def plot_tracks(axes, evidence):
                 fitted = fits.fit(p, q[inside])
                 laid = np.exp(1j * fitted.rotation) * p
                 laid = laid + signals.median((q[inside] - laid).real) + 1j * signals.median((q[inside] - laid).imag)
-                axes.plot(*thin(laid.real, laid.imag), color=ODOMETRY, linewidth=1.0,
+                axes.plot(*thin(laid.real, laid.imag), color=COLOURS["odometry"], linewidth=3.0,
                           label="odometry, laid over the fixes")
+        axes.plot(*thin(q.real, q.imag), ".", color=COLOURS["fix"], markersize=2.5, label="fixes")
         low, high = np.percentile(q.real, [1, 99]), np.percentile(q.imag, [1, 99])
         margin = 0.2 * max(np.ptp(low), np.ptp(high), 5.0)
         axes.set_xlim(low[0] - margin, low[1] + margin)
         axes.set_ylim(high[0] - margin, high[1] + margin)
     elif evidence.track() is not None:
         track = evidence.track()
-        axes.plot(*thin(track.place.real, track.place.imag), color=ODOMETRY, linewidth=1.0, label="odometry")
+        axes.plot(*thin(track.place.real, track.place.imag), color=COLOURS["odometry"], label="odometry")
     axes.set_aspect("equal", adjustable="datalim")
     axes.set_xlabel("east [m]")
     axes.set_ylabel("north [m]")
@@ -68,41 +74,76 @@ def plot_tracks(axes, evidence):
 
 def plot_speeds(axes, evidence, origin):
     """Speeds of odometry and receiver."""
-    if evidence.velocities is not None:
-        t, velocity = evidence.velocities
-        axes.plot(*thin(t - origin, np.abs(velocity)), ".", color=RECEIVER, markersize=2.0, label="receiver's velocity")
     if evidence.motion is not None:
         t, velocity, _ = evidence.motion
-        axes.plot(*thin(t - origin, velocity.real), color=ODOMETRY, linewidth=0.8, label="odometry, linear.x")
+        axes.plot(*thin(t - origin, velocity.real), color=COLOURS["odometry"], linewidth=1.6,
+                  label="odometry, linear.x")
         top = 1.5 * np.percentile(np.abs(velocity), 99.5) + 0.5
         axes.set_ylim(min(0.0, 1.3 * np.min(velocity.real)) - 0.1, max(top, 1.0))
+    if evidence.velocities is not None:
+        t, velocity = evidence.velocities
+        axes.plot(*thin(t - origin, np.abs(velocity)), ".", color=COLOURS["velocity"], markersize=2.0,
+                  label="receiver's velocity")
     axes.set_ylabel("speed [m/s]")
 
 
 def plot_rates(axes, evidence, origin):
     """Yaw rates of odometry and IMU."""
-    if evidence.imu_rate is not None:
-        t, rate = evidence.imu_rate
-        axes.plot(*thin(t - origin, rate), color=IMU, linewidth=0.6, label="IMU")
     if evidence.motion is not None:
         t, _, rate = evidence.motion
-        axes.plot(*thin(t - origin, rate), color=ODOMETRY, linewidth=0.6, label="odometry")
+        axes.plot(*thin(t - origin, rate), color=COLOURS["odometry"], linewidth=1.6, label="odometry")
+    if evidence.imu_rate is not None:
+        t, rate = evidence.imu_rate
+        axes.plot(*thin(t - origin, rate), color=COLOURS["imu"], linewidth=0.6, label="IMU")
     axes.set_ylabel("yaw rate [rad/s]")
 
 
-def plot_message_rates(axes, recording, origin):
+def plot_message_rates(axes, recording):
     """Messages a second of each stream."""
-    for stream in recording.streams():
+    edges = bins(recording)
+    top = 1.0
+    streams = recording.streams()
+    for index, stream in enumerate(streams):
         t = stream.received if stream.received.any() else stream.t
-        edges = np.arange(recording.begin, max(recording.end, recording.begin + 5.0) + 5.0, 5.0)
-        counts, _ = np.histogram(t, edges)
-        axes.step(edges[:-1] - origin, counts / 5.0, where="post", linewidth=0.9, label=stream.topic)
+        rates = np.histogram(t, edges)[0] / (edges[1] - edges[0])
+        axes.step(edges - recording.begin, np.append(rates, rates[-1]), where="post", label=stream.topic,
+                  color=RATE_COLOURS[stream.kind], linewidth=1.2 * (len(streams) - index))
+        top = max(top, np.max(rates))
     axes.set_yscale("symlog", linthresh=1.0)
+    axes.set_yticks([0.0] + [10.0 ** power for power in range(int(np.ceil(np.log10(top))) + 1)])
+    axes.yaxis.set_major_formatter("{x:g}")
+    axes.set_ylim(-0.1, 2.0 * top)
     axes.set_ylabel("messages [1/s]")
-    axes.set_xlabel("time [s]")
 
 
-def plots(evidence):
+def bins(recording):
+    """Edges of bins of about BIN_S, all of the same width: the last one ends with the recording."""
+    length = max(recording.duration(), 1e-3)
+    return np.linspace(recording.begin, recording.begin + length, max(1, round(length / BIN_S)) + 1)
+
+
+def timed(findings):
+    """The findings that know when."""
+    return [finding for finding in findings if finding.level in LEVEL_COLOURS and len(finding.values.get("spans", ()))]
+
+
+def mark_times(all_axes, recording, findings):
+    """When findings hold: a row of the last axes for each, with its name, and a shade over the others."""
+    origin, least = recording.first_stamp(), LEAST_SHOWN * recording.duration()
+    names = list(dict.fromkeys(finding.check for finding in findings))
+    for finding in findings:
+        colour = LEVEL_COLOURS[finding.level]
+        spans = [(begin - origin, max(end - begin, least)) for begin, end in finding.values["spans"]]
+        all_axes[-1].broken_barh(spans, (names.index(finding.check) - 0.3, 0.6), color=colour)
+        for axes in all_axes[:-1]:
+            for begin, width in spans:
+                axes.axvspan(begin, begin + width, color=colour, alpha=0.25, linewidth=0.0)
+    all_axes[-1].set_yticks(range(len(names)))
+    all_axes[-1].set_yticklabels(names)
+    all_axes[-1].set_ylim(len(names) - 0.5, -0.5)
+
+
+def plots(evidence, findings):
     """The figures as image tags."""
     import matplotlib
     matplotlib.use("Agg")
@@ -110,26 +151,33 @@ def plots(evidence):
 
     recording = evidence.recording
     parts = []
-    figure, axes = plt.subplots(figsize=(8.0, 6.5))
+    figure, axes = plt.subplots(figsize=(WIDTH_IN, 6.5))
     plot_tracks(axes, evidence)
     finish(axes)
     parts.append(("Tracks", embedded(figure, plt)))
-    figure, all_axes = plt.subplots(3, 1, figsize=(10.0, 8.5), sharex=True)
-    plot_speeds(all_axes[0], evidence, recording.begin)
-    plot_rates(all_axes[1], evidence, recording.begin)
-    plot_message_rates(all_axes[2], recording, recording.begin)
+    marked = timed(findings)
+    heights = [1.0, 1.0, 1.0] + ([0.1 * (1 + len({finding.check for finding in marked}))] if marked else [])
+    figure, all_axes = plt.subplots(len(heights), 1, figsize=(WIDTH_IN, 2.8 * sum(heights)), sharex=True,
+                                    gridspec_kw={"height_ratios": heights, "hspace": 0.3})
+    plot_speeds(all_axes[0], evidence, recording.first_stamp())
+    plot_rates(all_axes[1], evidence, recording.first_stamp())
+    plot_message_rates(all_axes[2], recording)
+    if marked:
+        mark_times(all_axes, recording, marked)
+    all_axes[-1].set_xlim(0.0, max(recording.duration(), 1.0))
+    all_axes[-1].set_xlabel("time [s]")
     for axes in all_axes:
         finish(axes)
-    parts.append(("Speeds, yaw rates, messages", embedded(figure, plt)))
+    parts.append(("Speeds, yaw rates, messages" + (", times of findings" if marked else ""), embedded(figure, plt)))
     return parts
 
 
 def finish(axes):
-    """Grid and legend."""
+    """Grid, and the legend above, where it hides nothing."""
     axes.grid(True, color="#dddddd", linewidth=0.6)
     axes.set_axisbelow(True)
     if axes.get_legend_handles_labels()[0]:
-        axes.legend(fontsize=8, loc="upper right")
+        axes.legend(fontsize=8, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncol=5, frameon=False)
 
 
 def table(findings):
@@ -148,16 +196,16 @@ def page(evidence, findings):
     title = html.escape("doctor: " + recording.name)
     parts = ["<!DOCTYPE html>", '<html lang="en"><head><meta charset="utf-8">',
              "<title>{}</title><style>{}</style></head><body>".format(title, STYLE), "<h1>{}</h1>".format(title),
-             "<p>{:.0f} s. {}</p>".format(max(recording.end - recording.begin, 0.0), html.escape(summary(findings)))]
+             "<p>{:.0f} s. {}</p>".format(recording.duration(), html.escape(summary(findings)))]
     bad = [finding for level in ("FAIL", "WARN") for finding in findings if finding.level == level]
     if bad:
         parts += ["<h2>What to change</h2>", table(bad)]
-    for heading, image in plots(evidence):
+    for heading, image in plots(evidence, findings):
         parts += ["<h2>{}</h2>".format(heading), image]
     for name in ordered_families(findings):
         parts += ["<h2>{}</h2>".format(html.escape(FAMILIES.get(name, name))),
                   table([finding for finding in findings if family(finding) == name])]
-    parts.append("<h2>Topics</h2><table>{}</table>".format("\n".join(
+    parts.append("<h2>All topics</h2><table>{}</table>".format("\n".join(
         "<tr><td>{}</td><td>{}</td><td>{}</td></tr>".format(html.escape(each.name), html.escape(each.type), each.count)
         for each in recording.topics)))
     return "\n".join(parts + ["</body></html>", ""])

@@ -7,6 +7,8 @@ from collections import Counter, namedtuple
 
 import numpy as np
 
+from . import signals
+
 # Columns of each kind of stream, beside t and received. SI units, radians, degrees for latitude and longitude.
 COLUMNS = {
     "odometry": ("x", "y", "yaw", "quaternion_norm", "vx", "vy", "wz", "pose_cov_x", "pose_cov_yaw", "twist_cov_x",
@@ -102,6 +104,16 @@ class Recording:
         self.trouble = []                    # what went wrong while reading
         for kind in KINDS:
             setattr(self, kind, (streams or {}).get(kind))
+
+    def duration(self):
+        """s, of the record."""
+        return max(self.end - self.begin, 0.0)
+
+    def first_stamp(self):
+        """The stamp that a message at the begin would have: `begin`, unless it was recorded anew at another time."""
+        delays = [signals.median(stream.received - stream.t) for stream in self.streams() if stream.received.any()]
+        delay = signals.median(delays) if delays else 0.0
+        return self.begin - (delay if abs(delay) > self.duration() else 0.0)
 
     def streams(self):
         """Those that there are and that have messages."""

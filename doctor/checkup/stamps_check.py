@@ -18,17 +18,17 @@ UNIX_S = 1e9                # s, since 2001: smaller is no time of day
 
 def check(evidence):
     """All findings of this family."""
-    findings = []
+    findings, origin = [], evidence.recording.first_stamp()
     for stream in evidence.recording.streams():
-        found = faults_of(stream)
+        found = faults_of(stream, origin)
         findings += found or [passed("stamps." + stream.kind, "{}: {} stamps in order, without gaps".format(
             stream.topic, len(stream)))]
     findings += epochs(evidence.recording)
     return findings
 
 
-def faults_of(stream):
-    """What is wrong with the stamps of a stream; empty where nothing is."""
+def faults_of(stream, origin):
+    """What is wrong with the stamps of a stream; empty where nothing is. `origin`: from which times are counted."""
     name, topic, count = "stamps." + stream.kind, stream.topic, len(stream)
     finite = np.isfinite(stream.t)
     zero = int(np.sum(~finite | (stream.t < ZERO_S)))
@@ -43,18 +43,19 @@ def faults_of(stream):
     t = stream.t[finite & (stream.t >= ZERO_S)]
     if len(t) < 2:
         return findings
-    steps = np.diff(t)
-    findings += disorder(name, topic, steps, count)
-    findings += gaps(name, stream.kind, topic, t)
+    findings += disorder(name, topic, t, count)
+    findings += gaps(name, stream.kind, topic, t, origin)
     if np.any(t > FAR_FUTURE_S):
         findings.append(failed(name, "{}: stamps of {:.0f} s are no time".format(topic, np.max(t)),
                                "in the driver: seconds, not milli- or nanoseconds"))
     return findings
 
 
-def disorder(name, topic, steps, count):
+def disorder(name, topic, t, count):
     """Stamps that come twice, or go back."""
     findings = []
+    steps = np.diff(t)
+    spans = [(after, before) for before, after in zip(t[:-1], t[1:]) if after < before]
     same, back = int(np.sum(steps == 0.0)), int(np.sum(steps < 0.0))
     jumps = steps[steps < -BACK_JUMP_S]
     if same > FEW * count:
@@ -64,14 +65,14 @@ def disorder(name, topic, steps, count):
     if len(jumps) > max(3, FEW * count):
         findings.append(failed(name, "{}: stamps jump back {} times, by up to {:.1f} s".format(
             topic, len(jumps), -np.min(jumps)), "one publisher, one clock; not two recordings in one bag",
-            back_jumps=len(jumps)))
+            back_jumps=len(jumps), spans=spans))
     elif back:
         findings.append(warned(name, "{}: {} stamps go back, by up to {:.2f} s".format(topic, back, -np.min(steps)),
-                               "one publisher on the topic; an odd message is left out", back=back))
+                               "one publisher on the topic; an odd message is left out", back=back, spans=spans))
     return findings
 
 
-def gaps(name, kind, topic, t):
+def gaps(name, kind, topic, t, origin):
     """Times without messages."""
     t = np.sort(t)
     steps = np.diff(t)
@@ -84,8 +85,8 @@ def gaps(name, kind, topic, t):
         return []
     worst = long[np.argmax(steps[long])]
     text = "{}: {} gaps of more than {:.2g} s, the longest {:.1f} s at {:.1f} s".format(
-        topic, len(long), limit, steps[worst], t[worst] - t[0])
-    values = dict(gaps=len(long), longest_s=float(steps[worst]))
+        topic, len(long), limit, steps[worst], t[worst] - origin)
+    values = dict(gaps=len(long), longest_s=float(steps[worst]), spans=list(zip(t[long], t[long + 1])))
     if kind == "odometry" and steps[worst] > ODOMETRY_GAP_S:
         share = float(np.sum(steps[long]) / max(t[-1] - t[0], 1e-9))
         finding = failed if share > GAP_SHARE else warned

@@ -14,7 +14,7 @@ FAMILIES = {"topics": "Topics", "stamps": "Stamps", "clocks": "Clocks", "frames"
 
 def lines_of(recording, findings, coloured=False, quiet=False):
     """The report, a line an entry."""
-    lines = ["doctor: {}, {:.0f} s".format(recording.name, max(recording.end - recording.begin, 0.0))]
+    lines = ["doctor: {}, {:.0f} s".format(recording.name, recording.duration())]
     for kind in KINDS:
         if kind in recording.choices:
             lines.append("  {:<11} {} ({})".format(kind + ":", *recording.choices[kind]))
@@ -60,7 +60,7 @@ def as_json(recording, findings, exit_code):
     """The report for programs."""
     return json.dumps(plain({
         "recording": recording.name,
-        "duration_s": max(recording.end - recording.begin, 0.0),
+        "duration_s": recording.duration(),
         "topics": [dict(name=each.name, type=each.type, count=each.count) for each in recording.topics],
         "chosen": {kind: dict(topic=topic, how=how) for kind, (topic, how) in recording.choices.items()},
         "findings": [dict(check=each.check, level=each.level, text=each.text, change=list(each.change),

@@ -147,11 +147,11 @@ def dead(evidence):
     topic = evidence.recording.odometry.topic
     if total > max(WARN_S, WARN_SHARE * moving):
         text = "{}: the wheels stand for {:.0f} s while the receiver moves (from {:.0f} s on): a dead encoder, " \
-            "slipping wheels, or reflections".format(topic, total, standing[0][0] - evidence.recording.begin)
+            "slipping wheels, or reflections".format(topic, total, standing[0][0] - evidence.recording.first_stamp())
         enough = max(FAIL_S, FAIL_SHARE * moving) * (1.0 if evidence.velocities is not None else 2.0)
         finding = failed if total > enough else warned
         return [finding("odometry.wheels", text, "encoder and cable; {} takes the receiver's speed meanwhile, where it "
-                        "has one (velocity_topic:=)".format(evidence.setup.section), standing_s=total)]
+                        "has one (velocity_topic:=)".format(evidence.setup.section), standing_s=total, spans=standing)]
     if evidence.velocities is None:
         return [passed("odometry.wheels", "{}: the wheels turn where the fixes move".format(topic))]
     spinning = runs(t, (np.interp(t, odometry_t, np.abs(own)) > 2.0 * MOVING_MPS)
@@ -160,8 +160,8 @@ def dead(evidence):
     if total > max(WARN_S, WARN_SHARE * moving):
         return [warned("odometry.wheels", "{}: the wheels turn for {:.0f} s while the receiver stands (from {:.0f} s "
                        "on): slipping wheels, or a receiver that holds its place".format(
-                           topic, total, spinning[0][0] - evidence.recording.begin),
-                       "the receiver's static hold off; else wheels with more grip", spinning_s=total)]
+                           topic, total, spinning[0][0] - evidence.recording.first_stamp()),
+                       "the receiver's static hold off; else wheels with more grip", spinning_s=total, spans=spinning)]
     return [passed("odometry.wheels", "{}: the wheels turn where the receiver moves".format(topic))]
 
 
@@ -187,8 +187,8 @@ def unsigned(evidence):
         return []
     return [warned("odometry.unsigned", "{}: for {:.1f} s (from {:.0f} s on) the receiver moves against the heading: a "
                    "speed without sign while reversing, or reflections".format(
-                       evidence.recording.odometry.topic, total, stretches[0][0] - evidence.recording.begin),
-                   "in the driver: twist.linear.x negative when reversing", backwards_s=total)]
+                       evidence.recording.odometry.topic, total, stretches[0][0] - evidence.recording.first_stamp()),
+                   "in the driver: twist.linear.x negative when reversing", backwards_s=total, spans=stretches)]
 
 
 def drift(evidence):

@@ -3,6 +3,7 @@ import itertools
 import json
 import math
 import os
+import re
 import sys
 import unittest
 
@@ -342,6 +343,35 @@ class ModuleTest(unittest.TestCase):
         html = page.page(found, findings)
         self.assertEqual(2, html.count('src="data:image/png;base64,'))
         self.assertNotIn("http", html.replace("http-equiv", ""))
+        headings = re.findall("<h2>(.*?)</h2>", html)
+        self.assertEqual(sorted(set(headings)), sorted(headings), "a heading stands once")
+        self.assertNotIn("times of findings", html)
+
+    def test_page_marks_the_times_of_findings(self):
+        recording = drive(seconds=60.0)
+        recording.odometry = recording.odometry.select(abs(recording.odometry.t - T0 - 33.0) > 3.0)
+        findings, found = checks.examine(recording, setup.DEFAULTS)
+        gap = [each for each in page.timed(findings) if each.check == "stamps.odometry"][0]
+        (begin, end), = gap.values["spans"]
+        self.assertAlmostEqual(30.0, begin - T0, delta=0.2)
+        self.assertAlmostEqual(36.0, end - T0, delta=0.2)
+        self.assertIn("the longest 6.1 s at 30.0 s", gap.text)
+        self.assertIn("times of findings", page.page(found, findings))
+
+    def test_times_count_from_the_begin_of_the_record(self):
+        recording = drive(seconds=60.0)
+        self.assertEqual(recording.begin, recording.first_stamp())
+        for stream in recording.streams():
+            stream.received = stream.received + 1e5
+        recording.begin, recording.end = recording.begin + 1e5, recording.end + 1e5
+        self.assertAlmostEqual(T0, recording.first_stamp(), delta=1.0)
+
+    def test_last_bin_of_the_rates_is_whole(self):
+        for length in (0.0, 2.0, 61.3):
+            recording = Recording("a", begin=T0, end=T0 + length)
+            edges = page.bins(recording)
+            self.assertAlmostEqual(max(length, 1e-3), edges[-1] - edges[0], delta=1e-6)
+            self.assertLess(np.ptp(np.diff(edges)), 1e-6)
 
 
 if __name__ == "__main__":
