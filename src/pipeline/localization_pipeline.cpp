@@ -246,7 +246,7 @@ void LocalizationPipeline::correct_with(const ValidatedFix& fix) {
   measurement.covariance = fix.fix.covariance;
   measurement.antenna_in_body =
       transform_point(*history_.motion_between(history_.latest(), undelayed(stamp)), antenna_);
-  measurement.bias_radius_m = biases_.radius_m();
+  measurement.bias_radius_m = biases_.radius_m().value_or(0.0);
   measurement.time_s = to_seconds(stamp);
   measurement.stamp = stamp;
   const SatelliteEpoch* epoch = satellites_.take(stamp);
@@ -366,7 +366,7 @@ LocalizationReport LocalizationPipeline::report() const {
   status.has_started = initialized();
   status.is_lost = start_.is_lost();
   status.waiting_for = waiting_for();
-  status.bias_radius_m = biases_.radius_m();
+  if (biases_.radius_m()) status.bias_radius_m = *biases_.radius_m();
   status.complaint = complaint();
   status.receiver_note = fixes_.complaint();
   status.time_to_detect_s = integrity_.time_to_detect_s();

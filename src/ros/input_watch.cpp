@@ -7,14 +7,16 @@ constexpr std::size_t kLongestName = 50;  ///< that is written
 
 }  // namespace
 
-void InputWatch::observe_frame(const std::string& frame) {
-  if (has_frame_ && frame != frame_) {
+bool InputWatch::observe_frame(const std::string& frame) {
+  if (frame.empty()) return false;
+  const bool has_changed = !frame_.empty() && frame != frame_;
+  if (has_changed) {
     const auto name = [](const std::string& id) { return "'" + id.substr(0, kLongestName) + "'"; };
     log_.warn(topic() + ": frame_id changed from " + name(frame_) + " to " + name(frame) +
               "; are two sources publishing?");
   }
   frame_ = frame;
-  has_frame_ = true;
+  return has_changed;
 }
 
 void InputWatch::check_publishers() {

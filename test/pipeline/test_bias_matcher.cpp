@@ -19,14 +19,14 @@ TEST(BiasMatcher, FixHasTheBiasOfItsOwnStamp) {
   matcher.add(bias(2.0, 4.0));
   matcher.add(bias(2.0, 5.0));  // once more: the last one counts
   EXPECT_FALSE(matcher.take(from_seconds(1.5)));
-  EXPECT_EQ(matcher.radius_m(), 0.0);
+  EXPECT_EQ(matcher.radius_m(), std::nullopt);
   EXPECT_EQ(matcher.take(from_seconds(1.0)).value().radius_m, 3.0);
   EXPECT_EQ(matcher.take(from_seconds(2.0)).value().radius_m, 5.0);
   EXPECT_EQ(matcher.radius_m(), 5.0);
   EXPECT_FALSE(matcher.take(from_seconds(3.0)));
   EXPECT_EQ(matcher.radius_m(), 5.0) << "the last one, where there is none";
   matcher.forget_radius();
-  EXPECT_EQ(matcher.radius_m(), 0.0);
+  EXPECT_EQ(matcher.radius_m(), std::nullopt);
 }
 
 TEST(BiasMatcher, IsAwaitedForTheTimeoutAtMost) {

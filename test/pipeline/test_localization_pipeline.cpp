@@ -53,6 +53,7 @@ TEST(LocalizationPipeline, WaitsForTheBiasAndUsesIt) {
   Rig rig(kGiven, true);
   rig.run(0.0, 1.0);  // fixes at 0 and 1 s
   EXPECT_TRUE(rig.fake->fixes.size() <= 1u);
+  EXPECT_TRUE(std::isnan(rig.pipeline.report().bias_radius_m));
   rig.bias(0.0, 0.5);
   rig.bias(1.0, 3.0);
   ASSERT_GE(rig.fake->fixes.size(), 1u);

@@ -1,3 +1,5 @@
+#include <cmath>
+
 #include "pipeline_rig.hpp"
 #include "urban_gnss_localization/pipeline/status_reporter.hpp"
 
@@ -84,6 +86,14 @@ TEST(StatusReporter, AMistakeOfTheReceiverIsSaidWhereAllElseIsWell) {
   EXPECT_FALSE(well.report().healthy);
   EXPECT_EQ(well.report().reason, "heading not known yet");
   EXPECT_EQ(well.report().receiver_note, "gps/fix has HDOP^2 as variance");
+}
+
+TEST(StatusReporter, BiasRadiusIsNoNumberWhereNoneIsKnown) {
+  Well well;
+  EXPECT_TRUE(std::isnan(well.report().bias_radius_m));
+  EXPECT_TRUE(std::isnan(StatusReporter({}, 2.0).report({}, FakeLocalizer()).bias_radius_m)) << "before the start";
+  well.status.bias_radius_m = 3.0;
+  EXPECT_EQ(well.report().bias_radius_m, 3.0);
 }
 
 TEST(StatusReporter, HealthNamesWhatIsWrongFirst) {

@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "urban_gnss_localization/ros/conversions.hpp"
+#include "urban_gnss_localization/ros/input_watch.hpp"
 #include "urban_gnss_localization/ros/node_shell.hpp"
 
 namespace urban_gnss {
@@ -74,6 +75,15 @@ TEST(NodeShell, NothingThatIsThrownEscapesAndItIsCounted) {
   EXPECT_EQ(diagnosis.level, diagnostic_msgs::DiagnosticStatus::ERROR);
   EXPECT_EQ(diagnosis.value("callbacks that failed"), "2");
   EXPECT_EQ(diagnosis.value("last error"), "odom failed: an exception of unknown type");
+}
+
+TEST(InputWatch, AFrameThatIsNotToldIsNoOther) {
+  EventLog log;
+  InputWatch watch(log);
+  for (const char* frame : {"", "gps", "", "gps"}) EXPECT_FALSE(watch.observe_frame(frame)) << "'" << frame << "'";
+  EXPECT_TRUE(watch.observe_frame("other"));
+  EXPECT_FALSE(watch.observe_frame(""));
+  EXPECT_TRUE(watch.observe_frame("gps"));
 }
 
 TEST(NodeShell, WhatIsNoEstimateDoesNotGoOut) {

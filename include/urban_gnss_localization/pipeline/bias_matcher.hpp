@@ -32,9 +32,9 @@ class BiasMatcher {
   /// The bias of a fix, as its turn has come; nothing where it did not come in time.
   std::optional<BiasEstimate> take(Stamp fix);
 
-  /// Radius (m) of the bias that was taken last; 0 before the first.
-  double radius_m() const { return radius_m_; }
-  void forget_radius() { radius_m_ = 0.0; }
+  /// Radius (m) of the bias that was taken last; nothing before the first.
+  std::optional<double> radius_m() const { return radius_m_; }
+  void forget_radius() { radius_m_.reset(); }
 
   void reset() { *this = BiasMatcher(parameters_); }
 
@@ -43,7 +43,7 @@ class BiasMatcher {
 
   BiasMatcherParameters parameters_;
   std::deque<BiasEstimate> biases_;
-  double radius_m_{0.0};
+  std::optional<double> radius_m_;
 };
 
 }  // namespace urban_gnss

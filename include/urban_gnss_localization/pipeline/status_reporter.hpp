@@ -54,7 +54,7 @@ struct LocalizationReport {
   double time_to_recover_s{std::numeric_limits<double>::quiet_NaN()};  ///< IntegrityMonitor
   double fix_delay_s{0.0};                                             ///< FixDelayEstimator
   bool heading_converged{false};
-  double bias_radius_m{0.0};
+  double bias_radius_m{std::numeric_limits<double>::quiet_NaN()};
   LocalizerHealth health;
 };
 
@@ -65,9 +65,9 @@ struct PipelineStatus {
   bool has_datum{false};
   bool has_started{false};
   bool is_lost{false};
-  std::string waiting_for;    ///< empty where it waits for nothing
-  double bias_radius_m{0.0};  ///< of the last gps/bias
-  std::string complaint;      ///< of sources that contradict each other; empty where they do not
+  std::string waiting_for;                                         ///< empty where it waits for nothing
+  double bias_radius_m{std::numeric_limits<double>::quiet_NaN()};  ///< of the last gps/bias
+  std::string complaint;  ///< of sources that contradict each other; empty where they do not
   Eigen::Matrix2d contradiction_m2{
       Eigen::Matrix2d::Zero()};  ///< that the published covariance has beside the localizer's
   double time_to_detect_s{std::numeric_limits<double>::quiet_NaN()};

@@ -20,18 +20,16 @@ class InputWatch {
   std::string topic() const { return subscriber_.getTopic(); }
   std::uint32_t publishers() const { return subscriber_.getNumPublishers(); }
 
-  /// To be called with each message's frame.
-  void observe_frame(const std::string& frame);
+  /// To be called with each message's frame; whether it has changed. An empty one says nothing: a receiver's driver may
+  /// not know it yet.
+  bool observe_frame(const std::string& frame);
   /// To be called now and then.
   void check_publishers();
-
-  const std::string& frame() const { return frame_; }
 
  private:
   EventLog& log_;
   ros::Subscriber subscriber_;
   std::string frame_;
-  bool has_frame_{false};
   bool warned_of_publishers_{false};
 };
 
