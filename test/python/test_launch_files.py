@@ -1,6 +1,8 @@
-"""Launch files: every node of ours forgets the parameters of the launch before."""
+"""Launch files: nodes forget the parameters of the launch before, and files are found where the user stands."""
 import glob
 import os
+import subprocess
+import tempfile
 import unittest
 import xml.etree.ElementTree as ElementTree
 
@@ -18,6 +20,29 @@ class LaunchFilesTest(unittest.TestCase):
                 ours += 1
                 self.assertEqual(node.get("clear_params"), "true", "%s: %s" % (os.path.basename(path), node.get("name")))
         self.assertGreater(ours, 10)
+
+    def test_files_may_be_relative(self):
+        """To the folder where roslaunch was called; a file that is missing is named with that folder."""
+        with tempfile.TemporaryDirectory() as folder:
+            with open(os.path.join(folder, "mine.yaml"), "w", encoding="utf-8") as file:
+                file.write("imm_ekf: {expert: {fix_delay: 0.25}}\n")
+
+            def said(launch, *arguments, option="--dump-params"):
+                environment = dict(os.environ, PWD=folder, ROS_LOG_DIR=folder,
+                                   ROS_PACKAGE_PATH=os.path.realpath(ROOT) + ":" + os.environ["ROS_PACKAGE_PATH"])
+                return subprocess.run(["roslaunch", *option.split(), os.path.join(ROOT, "launch", launch), *arguments],
+                                      stdout=subprocess.PIPE, stderr=subprocess.STDOUT, universal_newlines=True,
+                                      cwd=folder, env=environment, timeout=100).stdout
+
+            for launch in ("localization.launch", "comparison.launch"):
+                params = said(launch, "params:=mine.yaml")
+                self.assertIn("imm_ekf/expert/fix_delay: 0.25", params)
+                self.assertIn("imm_ekf/params_file: {}/mine.yaml".format(folder), params)
+            self.assertIn("/occlusion/imm_ekf/expert/fix_delay: 0.25", said("occlusion.launch", "params:=mine.yaml"))
+            for launch in ("localization.launch", "occlusion.launch"):
+                self.assertIn("file does not exist [{}/no.yaml]".format(folder), said(launch, "params:=no.yaml"))
+            self.assertIn("--bags {0}/a.bag {0}/b.bag /c.bag --topics".format(folder),
+                          said("replay.launch", "bag:=a.bag b.bag /c.bag", option="--args player"))
 
 
 if __name__ == "__main__":
