@@ -240,6 +240,8 @@ class ToolTest(unittest.TestCase):
         self.assertIn("particle_count = 0", output)
         self.assertIn("did you mean expert.ring_share?", output)
         self.assertIn("gate_timeout: no such parameter; it is expert.gate_timeout", output)
+        output = self.refuse("replay", self.path("in.bag"), "--datum", "91,0,0")
+        self.assertTrue(output.startswith("replay: --datum: 1 bad parameter"), output)
         self.assertIn("must be sensor_msgs/NavSatFix", self.refuse("replay", self.path("in.bag"), "--fix-topic", "tf"))
 
     def test_a_localizer_is_one_line_of_the_registry(self):

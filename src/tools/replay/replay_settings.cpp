@@ -81,10 +81,13 @@ void assign_without_odometry(const LocalizerNodeSettings& localizer, YAML::Node&
 
 /// Where the parameters come from, for people.
 std::string sources_of(const ReplayOptions& options) {
-  std::string sources;
-  for (const std::string& file : options.params) sources += (sources.empty() ? "" : ", ") + file;
-  if (!options.overrides.empty()) sources += sources.empty() ? "--set" : ", --set";
-  return sources.empty() ? "replay" : sources;
+  std::vector<std::string> sources = options.params;
+  if (!options.occlusion_params.empty()) sources.push_back(options.occlusion_params);
+  if (!options.overrides.empty()) sources.push_back("--set");
+  if (!options.datum.empty()) sources.push_back("--datum");
+  std::string text;
+  for (const std::string& source : sources) text += (text.empty() ? "" : ", ") + source;
+  return text.empty() ? "the package's files of parameters" : text;
 }
 
 /// The seed of the localizer's random numbers; nothing where it draws none.
