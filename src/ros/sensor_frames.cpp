@@ -31,7 +31,8 @@ void SensorFrames::observe_odometry(const std::string& frame, const std::string&
 }
 
 void SensorFrames::observe(Sensor& sensor, const std::string& frame) {
-  if (sensor.was_heard && sensor.frame == frame) return;
+  // A message without a frame is no news of one that is known.
+  if (sensor.was_heard && (frame.empty() || sensor.frame == frame)) return;
   sensor = {frame, true, !frame.empty() && frame != frames_.base_link, false};
 }
 

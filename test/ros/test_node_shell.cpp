@@ -8,6 +8,7 @@
 #include "urban_gnss_localization/ros/conversions.hpp"
 #include "urban_gnss_localization/ros/input_watch.hpp"
 #include "urban_gnss_localization/ros/node_shell.hpp"
+#include "urban_gnss_localization/ros/sensor_frames.hpp"
 
 namespace urban_gnss {
 namespace {
@@ -84,6 +85,18 @@ TEST(InputWatch, AFrameThatIsNotToldIsNoOther) {
   EXPECT_TRUE(watch.observe_frame("other"));
   EXPECT_FALSE(watch.observe_frame(""));
   EXPECT_TRUE(watch.observe_frame("gps"));
+}
+
+TEST(SensorFrames, AFixWithoutFrameDoesNotForgetTheAntennas) {
+  SensorFrames frames(Frames{}, true);
+  frames.observe_fix("gps");
+  for (int i = 0; i < 100; ++i) frames.observe_fix("");
+  EXPECT_TRUE(frames.take_events().empty());
+  EXPECT_FALSE(frames.is_complete());
+  frames.complain();
+  const auto events = frames.take_events();
+  ASSERT_EQ(events.size(), 1u);
+  EXPECT_THAT(events.front().text, HasSubstr("to the fix's frame gps"));
 }
 
 TEST(NodeShell, WhatIsNoEstimateDoesNotGoOut) {
