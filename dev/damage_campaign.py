@@ -20,7 +20,6 @@ import math
 import os
 import random
 import re
-import resource
 import shutil
 import signal
 import struct
@@ -29,11 +28,10 @@ import sys
 import tempfile
 import time
 
+import campaign
 import damage_inputs
 
-ROOT = os.path.dirname(os.path.dirname(os.path.realpath(__file__)))
 LONGEST_S = 40.0
-MOST_MEMORY = 4 << 30  # bytes of address space: more is a refusal to allocate, not a swapping machine
 NUMBERS = ("nan", "inf", "-inf", "1e308", "-1e308", "1e-320", "0", "-1", "-0.0", "4294967296", "9223372036854775808",
            "1" * 400, "1e", "0x10", "", " ", "1,5", "\u0661")
 WORDS = (0, 1, 0x7f, 0xff, 0xffff, 0x7fffffff, 0x80000000, 0xfffffff0, 0xffffffff, 0x10000000)
@@ -126,15 +124,8 @@ def damages_of(case):
 def program(name):
     """The command that starts one of the package's programs."""
     if name == "doctor":
-        return [sys.executable, "-B", os.path.join(ROOT, "doctor", "doctor")]
-    programs = os.environ.get("URBAN_GNSS_PROGRAMS")
-    return [os.path.join(programs, name)] if programs else ["rosrun", "urban_gnss_localization", name]
-
-
-def limit_memory():
-    """Of the tool."""
-    resource.setrlimit(resource.RLIMIT_AS, (MOST_MEMORY, MOST_MEMORY))
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+        return [sys.executable, "-B", os.path.join(campaign.ROOT, "doctor", "doctor")]
+    return campaign.program(name)
 
 
 def digests(folder):
@@ -178,7 +169,7 @@ def judge(case, inputs, results):
     command = program(case.command[0]) + [word.replace("{}", inputs).replace("OUT", results)
                                           for word in case.command[1:]]
     before = digests(inputs)
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, preexec_fn=limit_memory,
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, preexec_fn=campaign.limit_memory,
                                cwd=results)
     try:
         said = process.communicate(timeout=LONGEST_S)[0].decode(errors="replace")
@@ -255,21 +246,13 @@ def run(count, seed, seconds=None, only="", keep=None, jobs=2, report=print):
     return table, faults
 
 
-def row_of(kind, counts, verdicts):
-    """A line of the table."""
-    return "| %s | %d | " % (kind, sum(counts.values())) + " | ".join(str(counts[v]) for v in verdicts) + " |"
-
-
 def show(table):
     """The table as lines of text."""
     verdicts = sorted({verdict for counts in table.values() for verdict in counts})
-    lines = ["| input | cases | " + " | ".join(verdicts) + " |", "|---" * (2 + len(verdicts)) + "|"]
-    total = collections.Counter()
-    for kind, counts in table.items():
-        total.update(counts)
-        lines.append(row_of(kind, counts, verdicts))
-    lines.append(row_of("all", total, verdicts))
-    return "\n".join(lines)
+    total = sum(table.values(), collections.Counter())
+    rows = [[kind, sum(counts.values())] + [counts[verdict] for verdict in verdicts]
+            for kind, counts in list(table.items()) + [("all", total)]]
+    return campaign.table_of(["input", "cases"] + verdicts, rows)
 
 
 def main():

@@ -51,20 +51,26 @@ class Drive:
             turned = yaw_rate * t
             x, y = RADIUS * math.sin(turned), -RADIUS * math.cos(turned)
             self.truth[stamp.to_nsec()] = (x, y, turned)
-            odom = Odometry()
-            odom.header.stamp = stamp
-            odom.header.frame_id = "odom"
-            odom.child_frame_id = "base_link"
-            odom.pose.pose.position.x = RADIUS * math.sin(turned)
-            odom.pose.pose.position.y = RADIUS * (1.0 - math.cos(turned))
-            odom.pose.pose.orientation = Quaternion(0.0, 0.0, math.sin(turned / 2), math.cos(turned / 2))
-            odom.twist.twist.linear.x = SPEED + noise.gauss(0.0, 0.05)
-            odom.twist.twist.angular.z = yaw_rate + noise.gauss(0.0, 0.01)
+            odom = make_odometry(stamp, turned, noise)
             self.messages.append(("odom", odom))
             if k % FIX_EVERY == 0 and k > 0:
                 bias = 8.0 if 0.4 * seconds < t < 0.65 * seconds else 0.0
                 self.messages.append(("gps/fix", make_fix(stamp, x + bias + noise.gauss(0, 1.0),
                                                           y + noise.gauss(0, 1.0))))
+
+
+def make_odometry(stamp, turned, noise):
+    """Of a robot that has turned by that many radians on its circle."""
+    odom = Odometry()
+    odom.header.stamp = stamp
+    odom.header.frame_id = "odom"
+    odom.child_frame_id = "base_link"
+    odom.pose.pose.position.x = RADIUS * math.sin(turned)
+    odom.pose.pose.position.y = RADIUS * (1.0 - math.cos(turned))
+    odom.pose.pose.orientation = Quaternion(0.0, 0.0, math.sin(turned / 2), math.cos(turned / 2))
+    odom.twist.twist.linear.x = SPEED + noise.gauss(0.0, 0.05)
+    odom.twist.twist.angular.z = SPEED / RADIUS + noise.gauss(0.0, 0.01)
+    return odom
 
 
 def make_fix(stamp, east, north):

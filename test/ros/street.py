@@ -56,6 +56,26 @@ def horizontal(fix):
     return [fix.position_covariance[i] for i in (0, 1, 3, 4)]
 
 
+def make_satellites(stamp):
+    message = SatelliteArray()
+    message.header.stamp, message.header.frame_id = stamp, "gps"
+    for svid, (azimuth, elevation, cn0) in SKY.items():
+        message.satellites.append(Satellite(svid=svid, name="G%02d" % svid, azimuth=math.radians(azimuth),
+                                            elevation=math.radians(elevation), cn0=cn0, tracked=True,
+                                            used=Satellite.USED, pseudorange_residual=float("nan")))
+    return message
+
+
+def make_fix(stamp):
+    fix = NavSatFix()
+    fix.header.stamp, fix.header.frame_id = stamp, "gps"
+    fix.status.status = NavSatStatus.STATUS_FIX
+    fix.latitude, fix.longitude, fix.altitude = 48.1374, 11.5755, 520.0
+    fix.position_covariance = CLAIMED
+    fix.position_covariance_type = NavSatFix.COVARIANCE_TYPE_KNOWN
+    return fix
+
+
 class Street:
     """`nodes`: namespaces of the occlusion nodes that take its messages."""
 
@@ -110,8 +130,8 @@ class Street:
             if cloud is not None:
                 self.publishers["points"].publish(to_cloud(stamp, cloud))
             if satellites:
-                self.publishers["gps/satellites"].publish(self._satellites(stamp))
-            self.publishers["gps/fix"].publish(self._fix(stamp))
+                self.publishers["gps/satellites"].publish(make_satellites(stamp))
+            self.publishers["gps/fix"].publish(make_fix(stamp))
             stamps.append(stamp.to_nsec())
             self.last_fed_s = self.time_s
             if has_jumped and index < 3:
@@ -130,26 +150,6 @@ class Street:
         """Clouds of one moment, without anything else."""
         for i in range(clouds):
             self.publishers["points"].publish(to_cloud(rospy.Time.from_sec(self.time_s + 0.01 + 1e-4 * i), points))
-
-    @staticmethod
-    def _satellites(stamp):
-        message = SatelliteArray()
-        message.header.stamp, message.header.frame_id = stamp, "gps"
-        for svid, (azimuth, elevation, cn0) in SKY.items():
-            message.satellites.append(Satellite(svid=svid, name="G%02d" % svid, azimuth=math.radians(azimuth),
-                                                elevation=math.radians(elevation), cn0=cn0, tracked=True,
-                                                used=Satellite.USED, pseudorange_residual=float("nan")))
-        return message
-
-    @staticmethod
-    def _fix(stamp):
-        fix = NavSatFix()
-        fix.header.stamp, fix.header.frame_id = stamp, "gps"
-        fix.status.status = NavSatStatus.STATUS_FIX
-        fix.latitude, fix.longitude, fix.altitude = 48.1374, 11.5755, 520.0
-        fix.position_covariance = CLAIMED
-        fix.position_covariance_type = NavSatFix.COVARIANCE_TYPE_KNOWN
-        return fix
 
 
 def by_svid(visibility):

@@ -1,0 +1,24 @@
+"""What the two campaigns share: how a program of the package is started, its limits, the table of what came of it."""
+import os
+import resource
+
+ROOT = os.path.dirname(os.path.dirname(os.path.realpath(__file__)))
+MOST_MEMORY = 4 << 30  # bytes of address space: more is a refusal to allocate, not a swapping machine
+
+
+def program(name):
+    """The command that starts one of the package's programs."""
+    programs = os.environ.get("URBAN_GNSS_PROGRAMS")
+    return [os.path.join(programs, name)] if programs else ["rosrun", "urban_gnss_localization", name]
+
+
+def limit_memory():
+    """Of the process that is about to start."""
+    resource.setrlimit(resource.RLIMIT_AS, (MOST_MEMORY, MOST_MEMORY))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+
+
+def table_of(head, rows):
+    """As lines of text: a row has a name, then numbers."""
+    lines = ["| " + " | ".join(head) + " |", "|---" * len(head) + "|"]
+    return "\n".join(lines + ["| " + " | ".join(map(str, row)) + " |" for row in rows])
