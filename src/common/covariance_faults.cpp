@@ -4,6 +4,8 @@
 #include <cmath>
 #include <sstream>
 
+#include "urban_gnss_localization/common/positive_definite.hpp"
+
 namespace urban_gnss {
 namespace {
 
@@ -35,7 +37,7 @@ std::string covariance_fault(const Eigen::MatrixXd& matrix, const std::vector<co
       const double a = matrix(i, j), b = matrix(j, i);
       // Each root by itself: the product of two variances may be beyond what a number holds.
       const double scale = std::sqrt(matrix(i, i)) * std::sqrt(matrix(j, j));
-      if (std::abs(a - b) > kRounding * (scale + std::abs(a) + std::abs(b))) {
+      if (!is_same_covariance(a, b, scale)) {
         return text("covariances of ", name(i), " and ", name(j), " = ", a, " and ", b, ": must be the same");
       }
       if (std::abs(a) > (1.0 + kRounding) * scale) {

@@ -42,6 +42,10 @@ void VelocityQueue::add(const RawVelocity& velocity) {
   } else {
     usable.covariance = isotropic(parameters_.velocity_sigma_default);
   }
+  // Who declares more knows nothing; the products of such numbers would be none.
+  if (usable.covariance.diagonal().maxCoeff() > kMaxSpeed_mps * kMaxSpeed_mps) {
+    usable.covariance = isotropic(kMaxSpeed_mps);
+  }
   push_bounded(waiting_, usable);
 }
 

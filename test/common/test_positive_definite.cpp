@@ -23,6 +23,19 @@ TEST(PositiveDefinite, IsWhatHasACholeskyFactor) {
   }
 }
 
+TEST(PositiveDefinite, IsSymmetricButForRounding) {
+  Eigen::Matrix2d matrix = Eigen::Matrix2d::Identity();
+  matrix(0, 1) = -1e-9;
+  EXPECT_TRUE(is_positive_definite(matrix));
+  for (const double above : {-1.0, 0.1, 1e300, std::numeric_limits<double>::max()}) {
+    matrix(0, 1) = above;
+    EXPECT_FALSE(is_positive_definite(matrix)) << above;
+  }
+  matrix *= 1e-300;
+  matrix(0, 1) = 0.5e-300;
+  EXPECT_FALSE(is_positive_definite(matrix));
+}
+
 TEST(NearestPositiveDefinite, LeavesSoundMatricesAndRepairsOthers) {
   RandomEngine engine = make_engine(9);
   for (int trial = 0; trial < 200; ++trial) {

@@ -28,6 +28,27 @@ TEST(VelocityQueue, WaitsForTheOdometryInItsOrder) {
   EXPECT_FALSE(queue.take(Rig::at(5.0)));
 }
 
+TEST(VelocityQueue, GivesACovarianceThatCanBeWorkedWith) {
+  VelocityQueue queue({});
+  RawVelocity none = Rig::velocity(1.0);
+  none.covariance.setZero();
+  queue.add(none);
+  const Eigen::Matrix2d standard = queue.take(Rig::at(1.0)).value().covariance;
+  for (const double covariance : {-1.0, 0.005, 1e300}) {
+    RawVelocity skew = Rig::velocity(1.0);
+    skew.covariance << 0.01, covariance, 0.0, 0.01;
+    queue.add(skew);
+    EXPECT_EQ(queue.take(Rig::at(1.0)).value().covariance, standard) << covariance;
+  }
+  for (const double variance : {1e5, 1e300, std::numeric_limits<double>::max()}) {
+    RawVelocity huge = Rig::velocity(1.0);
+    huge.covariance << variance, 0.0, 0.0, 0.01;
+    queue.add(huge);
+    EXPECT_EQ(queue.take(Rig::at(1.0)).value().covariance, Eigen::Matrix2d(150.0 * 150.0 * Eigen::Matrix2d::Identity()))
+        << variance;
+  }
+}
+
 TEST(VelocityQueue, MatchedVelocitiesDifferByTheHeadingAlone) {
   const Eigen::Vector2d antenna(0.7, -0.4);
   OdometryHistory history;
