@@ -1,14 +1,15 @@
 #!/usr/bin/env python3
 """Gives the live nodes messages that no sensor should send, and counts what goes wrong.
 
-usage: fault_campaign.py [--cases N] [--seconds S] [--seed 1] [--only TEXT] [--list]
+usage: fault_campaign.py [--cases N] [--seconds S] [--seed 1] [--rigs NODE ...] [--only TEXT] [--list]
 
-Starts the nodes on a master of its own, feeds a good stream in lockstep (stamps of its own; nothing sleeps), and puts one
-odd message after the other in between: each field of each type that a node subscribes to, as NaN, infinite, the largest
-number, 0, -1, empty, huge; bytes that are no message; stamps and streams that are odd; clocks that jump; odd requests to
-each service; signals. After each case good messages follow. Faults are: a crash; a published number that is not finite;
-a negative variance; a reset after one odd message; no answer any more (hang); an estimate that stays more than 8 m off.
-Each fault is tried again on a fresh node, alone or with the cases before it, and printed. Exits with 1 where there was one.
+Starts the nodes on a master of its own, feeds a good stream in lockstep (stamps of its own; nothing sleeps), and puts
+one odd message after the other in between: each field of each type that a node subscribes to, as NaN, infinite, the
+largest number, 0, -1, empty, huge; bytes that are no message; stamps and streams that are odd; clocks that jump; odd
+requests to each service; signals. After each case good messages follow. Faults are: a crash; a published number that is
+not finite; a negative variance; a reset after one odd message; no answer any more (hang); an estimate that stays more
+than 8 m off. Each fault is tried again on a fresh node, alone or with the cases before it, and printed. Exits with 1
+where there was one.
 
 --only takes what has TEXT in its name, which is "NODE TOPIC TYPE CASE". The same seed gives the same cases in the same
 order. With --cases or --seconds each node has its share of them. The workspace must be sourced; URBAN_GNSS_PROGRAMS may
@@ -30,10 +31,13 @@ import fault_messages
 
 ANSWER_S = 0.5       # of wall time, for the answer to a batch
 LAST_ANSWER_S = 10.0
-BATCHES = 60         # of good messages, after which no answer is a hang
+SHORT_S = 0.05       # after which the next batch goes on
+BATCHES = 120        # of good messages, after which no answer is a hang
+FURTHEST_M = 8.0     # of the estimate from the truth
 MOST_FAULTS = 3      # that are tried again, of one kind and type
 VERDICTS = ("crash", "non-finite", "negative variance", "reset", "hang", "off")
 RECOVERIES = ("recovery from one, s", "from more, s")  # the worst
+SETTLE = 6           # batches, after which a reset has been said
 HISTORY = (1, 3, 10, 40)
 
 
@@ -44,7 +48,6 @@ class Session:
         self.rospy, self.master, self.rig, self.seed = rospy, master, rig, seed
         self.ends = fault_graph.Ends(rospy, rig.name)
         self.notes = []
-        self.start()
 
     # --- the nodes
 
@@ -113,9 +116,10 @@ class Session:
 
     def close(self):
         for node in self.rig.nodes:
-            node.end()
+            if node.is_alive():
+                node.end()
         self.ends.close()
-        if self.stream.simulated_time:
+        if self.rospy.has_param("/use_sim_time"):
             self.rospy.delete_param("/use_sim_time")
 
     # --- what cases do
@@ -136,7 +140,7 @@ class Session:
 
     def names_of(self, probe):
         probe.index += 1
-        return ["/tf" if topic == "/tf" else "/%s/%s" % (self.rig.name, topic) for topic in probe.topics()]
+        return [topic if topic.startswith("/") else "/%s/%s" % (self.rig.name, topic) for topic in probe.topics()]
 
     def publish(self, topic, *messages):
         for message in messages:
@@ -228,7 +232,7 @@ class Session:
 
     def is_well(self):
         """Whether the estimate is where the robot is."""
-        return not self.rig.finds_place or self.error_m() < 8.0
+        return not self.rig.finds_place or self.error_m() < FURTHEST_M
 
     def error_m(self):
         (topic, _), = self.rig.answers.items()
@@ -247,7 +251,7 @@ class Session:
         was_answered = None
         for batch in range(BATCHES):
             self.feed(self.stream.steps)
-            answered = self.is_answered(LAST_ANSWER_S if batch == BATCHES - 1 else ANSWER_S)
+            answered = self.is_answered(LAST_ANSWER_S if batch == BATCHES - 1 else SHORT_S)
             if self.crashes():
                 return None
             if answered and was_answered is None:
@@ -287,7 +291,7 @@ class Session:
     def settle(self):
         """What a node says late of a reset must not be laid to the next case."""
         if not self.crashes():
-            self.feed(2 * self.stream.steps)
+            self.feed(SETTLE * self.stream.steps)
             self.is_answered(ANSWER_S)
             time.sleep(0.05)
 
@@ -310,7 +314,7 @@ class Campaign:
         master = fault_graph.Master()
         try:
             import rospy
-            rospy.init_node("fault_campaign", disable_signals=True, disable_rosout=True)
+            rospy.init_node("fault_campaign", disable_signals=True, disable_rosout=True, log_level=rospy.FATAL)
             import fault_rigs
             rigs = fault_rigs.all_rigs()
             wanted = [rig for rig in rigs if not self.options.rigs or rig.name in self.options.rigs]
@@ -327,6 +331,7 @@ class Campaign:
         most = -(-self.left // rigs_left)
         session = Session(rospy, master, rig, self.options.seed)
         try:
+            session.start()
             cases = list(fault_cases.all_cases(session, self.options.seed))
             random.Random("%d %s" % (self.options.seed, rig.name)).shuffle(cases)
             cases += fault_cases.process_cases(session) if rig.only is None else ()
@@ -340,9 +345,9 @@ class Campaign:
                     break
                 self.one(session, case, done)
             self.left -= len(done)
+            self.report("%s: %d of %d cases in %.0f s" % (rig.name, len(done), len(cases), time.monotonic() - begin))
         finally:
             session.close()
-        self.report("%s: %d of %d cases in %.0f s" % (rig.name, len(done), len(cases), time.monotonic() - begin))
 
     def one(self, session, case, done):
         faults, recovery = session.run(case)
@@ -407,6 +412,7 @@ def main():
     parser.add_argument("--rigs", nargs="+", default=[], help="of these nodes alone")
     parser.add_argument("--list", action="store_true", help="the cases, without a run")
     options = parser.parse_args()
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(2))  # and no node is left behind
     work = Campaign(options, lambda text: print(text, flush=True))
     work.run()
     print(show(work.table))

@@ -84,7 +84,8 @@ def start_cases(session, seed):
         kind = session.subscriptions[topic]
         fields = list(fault_messages.field_cases(session.good(topic)))
         fields = random.Random("%d %s" % (seed, topic)).sample(fields, min(AT_START, len(fields)))
-        fields += [each for each in fault_messages.field_cases(session.good(topic)) if each[0].startswith("header.stamp")]
+        fields += [each for each in fault_messages.field_cases(session.good(topic))
+                   if each[0].startswith("header.stamp")]
         for k, (name, path, value) in enumerate(fields):
             def act(s, k=k, topic=topic, path=path, value=value):
                 s.call(reset, s.services[reset]._request_class())
@@ -119,7 +120,8 @@ def service_cases(session, name, kind):
 
     yield make("good", lambda s: s.call(name, good(s)))
     for case, path, value in fault_messages.field_cases(good(session)):
-        yield make(case, lambda s, path=path, value=value: s.call(name, fault_messages.with_value(good(s), path, value)))
+        yield make(case, lambda s, path=path, value=value: s.call(
+            name, fault_messages.with_value(good(s), path, value)))
     yield make("%d threads, %d calls each" % (CALLERS, CALLS), lambda s: call_at_once(s, name, good(s)))
 
 

@@ -1,4 +1,4 @@
-"""A master of one's own, the nodes of the package on it, and ends of all their topics: what the live campaign stands on."""
+"""A master of one's own, the nodes of the package on it, and ends of all their topics, for the live campaign."""
 import os
 import re
 import shutil

@@ -3,6 +3,7 @@
 Types are known by their definitions alone (genpy): there is no list of fields here."""
 import copy
 import functools
+import io
 import math
 import re
 import struct
@@ -132,8 +133,7 @@ def _put(container, key, value):
 
 def buffer_of(message):
     """As it goes over the wire."""
-    from io import BytesIO
-    stream = BytesIO()
+    stream = io.BytesIO()
     message.serialize(stream)
     return stream.getvalue()
 

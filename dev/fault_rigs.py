@@ -6,11 +6,14 @@ import sys
 import tempfile
 
 import rospy
+from dynamic_reconfigure.msg import Config, StrParameter
+from dynamic_reconfigure.srv import ReconfigureRequest
 from geometry_msgs.msg import (Point, PoseWithCovarianceStamped, Twist, TwistStamped, TwistWithCovarianceStamped)
 from nav_msgs.msg import Odometry
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Imu, NavSatFix
 from tf2_msgs.msg import TFMessage
+from urban_gnss_localization import srv
 from urban_gnss_localization.msg import GpsBias
 
 import campaign
@@ -22,14 +25,14 @@ import driver_messages  # noqa: E402
 import street  # noqa: E402
 
 START_S = 100000.0
-FURTHEST_M = 8.0
+TF_EVERY = 5
 
 
 class Stream:
     """Messages of one moment after another. Stamps (`now`) may jump; the robot (`driven`) does not."""
 
     period = 1.0 / drive.ODOM_RATE_HZ
-    steps = 10          # of a case
+    steps = 5           # of a case
     warm_steps = 400
     simulated_time = False
 
@@ -45,7 +48,8 @@ class Stream:
         self.driven += self.period
         self.index += 1
         clock = [("/clock", Clock(self.stamp()))] if self.simulated_time else []
-        return clock + [(self.name + "/" + topic, self.make(topic)) for topic in self.topics()]
+        return clock + [(topic if topic.startswith("/") else self.name + "/" + topic, self.make(topic))
+                        for topic in self.topics()]
 
     def stamp(self, later_s=0.0):
         return rospy.Time.from_sec(max(0.0, self.now + later_s))
@@ -145,9 +149,6 @@ class Stream:
 
     def requests(self):
         """{service's name, without the namespace: a good request}."""
-        from urban_gnss_localization import srv
-        from dynamic_reconfigure.msg import Config, StrParameter
-        from dynamic_reconfigure.srv import ReconfigureRequest
         latitude, longitude, altitude = drive.DATUM
         return {"set_pose": srv.SetPoseRequest(self.pose(self.stamp())),
                 "datum": srv.SetDatumRequest(latitude, longitude, altitude),
@@ -163,7 +164,7 @@ class RobotStream(Stream):
     """All that a localizer takes."""
 
     def topics(self):
-        due = ["odom", "imu/data"]
+        due = ["odom", "imu/data"] + (["/tf"] if self.index % TF_EVERY == 0 else [])
         if self.index % drive.FIX_EVERY == 0:
             due += ["gps/velocity", "gps/satellites", "gps/fix"]
         return due
@@ -184,10 +185,6 @@ class StreetStream(Stream):
 
     def topics(self):
         return ["/tf", "odometry/filtered", "imu/data", "points", "gps/satellites", "gps/fix"]
-
-    def step(self):
-        messages = super().step()
-        return [("/tf" if topic.endswith("//tf") else topic, message) for topic, message in messages]
 
     def fix(self, stamp):
         return street.make_fix(stamp)
@@ -264,7 +261,7 @@ class Rig:
         self.only = only                # kinds of cases, or all
 
 
-QUIET = {"expert/particle_count": 200}
+QUIET = {"expert/particle_count": 200, "expert/particle_cloud_rate": 1.0}
 
 
 def localizer(name, stream=RobotStream, parameters=None, others=(), only=None, rig=None):
@@ -275,7 +272,7 @@ def localizer(name, stream=RobotStream, parameters=None, others=(), only=None, r
 
 
 def all_rigs():
-    """In the order in which they are run."""
+    """In the order in which they are run: those with few cases first, who leave their time to the others."""
     class SimulatedRobot(RobotStream):
         simulated_time = True
 
@@ -302,14 +299,7 @@ def all_rigs():
                    {"/%s/cmd_vel" % name: "count"}, ("/%s/gps/datum" % name,), only=only)
 
     return [
-        localizer("imm_ekf"),
-        localizer("particle_filter", parameters=QUIET,
-                  others=[Node("gps_bias_node", "/particle_filter/gps_bias", {"localizer": "localizer"})]),
-        occlusion("occlusion", StreetStream),
         controller("controller", EstimateStream),
-        localizer("complementary_ekf", PlainStream),
-        localizer("ukf"),
-        localizer("switching_particle_filter", parameters=QUIET),
         Rig("receiver", NmeaStream, [Node("receiver_node", "/receiver/receiver", {"receiver": "nmea"})],
             {"/receiver/gps/fix": "count"}),
         Rig("comparison", ComparisonStream,
@@ -321,4 +311,11 @@ def all_rigs():
         localizer("imm_ekf", SimulatedRobot, only=clock, rig="imm_ekf_sim_time"),
         occlusion("occlusion_sim_time", SimulatedStreet, clock),
         controller("controller_sim_time", SimulatedEstimates, clock),
+        localizer("imm_ekf"),
+        localizer("particle_filter", parameters=QUIET,
+                  others=[Node("gps_bias_node", "/particle_filter/gps_bias", {"localizer": "localizer"})]),
+        occlusion("occlusion", StreetStream),
+        localizer("complementary_ekf", PlainStream),
+        localizer("ukf"),
+        localizer("switching_particle_filter", parameters=QUIET),
     ]
