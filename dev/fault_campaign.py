@@ -24,6 +24,8 @@ import sys
 import threading
 import time
 
+import genpy.message
+
 import campaign
 import fault_cases
 import fault_graph
@@ -66,18 +68,17 @@ class Session:
 
     def connect(self):
         """Ends of all that the nodes subscribe to and publish."""
-        import roslib.message
         import rosservice
         nodes = [node.name for node in self.rig.nodes]
         fault_graph.await_(self.is_complete, "the nodes of " + self.rig.name)
         self.subscriptions, self.services = {}, {}
         for node in nodes:
             for topic, kind in self.master.subscriptions(node).items():
-                kind = type(self.good(topic)) if kind == "*" else roslib.message.get_message_class(kind)
+                kind = type(self.good(topic)) if kind == "*" else genpy.message.get_message_class(kind)
                 self.subscriptions[topic] = kind
                 self.ends.publisher(topic, kind)
             for topic, kind in self.master.publications(node).items():
-                self.ends.subscribe(topic, roslib.message.get_message_class(kind), nodes)
+                self.ends.subscribe(topic, genpy.message.get_message_class(kind), nodes)
             for name in self.master.services(node):
                 if not name.endswith(("_logger_level", "/get_loggers")) and not name.startswith(node + "/load_nodelet"):
                     self.services[name] = rosservice.get_service_class_by_name(name)
@@ -282,7 +283,7 @@ class Session:
         case.act(self)
         recovery = self.recover() if not case.is_command else self.recover_after_command()
         faults = set(self.crashes()) | set(self.notes) | set(self.ends.faults)
-        if case.may_reset or case.is_command:
+        if case.may_reset or (case.is_command and self.ends.resets):
             self.settle()
         elif self.ends.resets:
             faults.add(("reset", self.ends.resets[0][:200]))

@@ -13,7 +13,7 @@ import xmlrpc.client
 import campaign
 import fault_messages
 
-START_S = 30.0
+START_S = 90.0  # of a busy machine
 CALLER = "/fault_campaign"
 # Lines of a log that say that what was known is given up.
 RESET = re.compile(r"^reset:|started anew|starting anew|it is cleared|started from (?!a pose that was set)")
@@ -41,7 +41,11 @@ class Master:
         # pylint: disable=consider-using-with
         self.process = subprocess.Popen(["roscore", "-p", str(self.port)], stdout=subprocess.DEVNULL,
                                         stderr=subprocess.DEVNULL, start_new_session=True)
-        await_(self.answers, "the master")
+        try:
+            await_(self.answers, "the master")
+        except RuntimeError:
+            self.stop()
+            raise
 
     def answers(self):
         try:
