@@ -39,6 +39,8 @@ FURTHEST_M = 8.0     # of the estimate from the truth
 MOST_FAULTS = 3      # that are tried again, of one kind and type
 VERDICTS = ("crash", "non-finite", "negative variance", "reset", "hang", "off")
 RECOVERIES = ("recovery from one, s", "from more, s")  # the worst
+TOGETHER = 5         # odd messages, before what came of them is judged; each by itself, if something did
+BETWEEN = 2          # good moments between them
 SETTLE = 6           # batches, after which a reset has been said
 HISTORY = (1, 3, 10, 40)
 
@@ -276,11 +278,13 @@ class Session:
             longest = max(longest, min(after, default=0.0))  # what was asked before a jump may come later
         return longest
 
-    def run(self, case):
-        """([(verdict, where)], recovery in s)."""
+    def run(self, *cases):
+        """([(verdict, where)], recovery in s) of one case, or of several that are each one odd message."""
         self.ends.clear()
         del self.notes[:]
-        case.act(self)
+        for case in cases:
+            case.act(self)
+            self.feed(BETWEEN if len(cases) > 1 else 0)
         recovery = self.recover() if not case.is_command else self.recover_after_command()
         faults = set(self.crashes()) | set(self.notes) | set(self.ends.faults)
         if case.may_reset or (case.is_command and self.ends.resets):
@@ -333,37 +337,76 @@ class Campaign:
         session = Session(rospy, master, rig, self.options.seed)
         try:
             session.start()
-            cases = list(fault_cases.all_cases(session, self.options.seed))
-            random.Random("%d %s" % (self.options.seed, rig.name)).shuffle(cases)
-            cases += fault_cases.process_cases(session) if rig.only is None else ()
-            cases = [case for case in cases if self.options.only in fault_cases.full_name(case)]
+            groups = self.groups_of(session)
+            count = sum(map(len, groups))
             if self.options.list:
-                self.report("\n".join(map(fault_cases.full_name, cases)))
+                self.report("\n".join(fault_cases.full_name(case) for group in groups for case in group))
                 return
             done = []
-            for case in cases[:most]:
-                if time.monotonic() > end:
+            for group in groups:
+                if time.monotonic() > end or len(done) >= most:
                     break
-                self.one(session, case, done)
+                self.several(session, group, done)
             self.left -= len(done)
-            self.report("%s: %d of %d cases in %.0f s" % (rig.name, len(done), len(cases), time.monotonic() - begin))
+            self.report("%s: %d of %d cases in %.0f s" % (rig.name, len(done), count, time.monotonic() - begin))
         finally:
             session.close()
 
-    def one(self, session, case, done):
-        faults, recovery = session.run(case)
+    def groups_of(self, session):
+        """The cases of a rig in the order of the seed: odd messages some at a time, all others alone."""
+        def wanted(cases):
+            return [case for case in cases if self.options.only in fault_cases.full_name(case)]
+
+        def is_one_message(case):
+            return case.group == "field" and not case.is_command
+
+        numbers = random.Random("%d %s" % (self.options.seed, session.rig.name))
+        cases = wanted(fault_cases.all_cases(session, self.options.seed))
+        numbers.shuffle(cases)
+        messages = [case for case in cases if is_one_message(case)]
+        groups = [messages[k:k + TOGETHER] for k in range(0, len(messages), TOGETHER)]
+        groups += [[case] for case in cases if not is_one_message(case)]
+        numbers.shuffle(groups)
+        if session.rig.only is None:
+            groups += [[case] for case in wanted(fault_cases.process_cases(session))]
+        return groups
+
+    def several(self, session, group, done):
+        faults, recovery = session.run(*group) if len(group) > 1 else (None, None)
+        if faults == []:
+            for case in group:
+                self.count(case, recovery, done)
+            return
+        known = len(self.faults)
+        if faults:
+            session.start()
+        for case in group:
+            self.one(session, case, done)
+        if faults and len(self.faults) == known:
+            self.note(group, faults)
+
+    def count(self, case, recovery, done):
         done.append(case)
         row = self.table.setdefault((case.rig, case.kind), collections.Counter())
         row["cases"] += 1
         which = RECOVERIES[case.may_reset]
         row[which] = max(row[which], recovery or 0.0)
+
+    def note(self, cases, faults):
+        """What cases ended in; of several, together, in the row of the last."""
+        row = self.table[cases[-1].rig, cases[-1].kind]
         for verdict in {verdict for verdict, _ in faults}:
             row[verdict] += 1
+        self.faults.append("%s: %s" % ("\n  and ".join(map(fault_cases.full_name, cases)),
+                                       "; ".join("%s (%s)" % fault for fault in faults)))
+        self.report(self.faults[-1])
+
+    def one(self, session, case, done):
+        faults, recovery = session.run(case)
+        self.count(case, recovery, done)
         if not faults:
             return
-        text = "%s: %s" % (fault_cases.full_name(case), "; ".join("%s (%s)" % fault for fault in faults))
-        self.report(text)
-        self.faults.append(text)
+        self.note([case], faults)
         kinds = {verdict for verdict, _ in faults}
         key = (case.rig, case.kind, min(kinds))
         self.retried[key] += 1

@@ -28,6 +28,7 @@ namespace {
 constexpr double kMarkerInterval_s = 0.1;
 /// How far the simulation may be behind the wall clock and still catch up; what is more is lost time.
 constexpr double kMaxLag_s = 0.5;
+constexpr double kMaxCommand = 1000.0;  ///< m/s and rad/s
 
 enum class Field { kPaperField, kCity };
 EnumNames<Field> enum_names(Field) { return {{"paper_field", Field::kPaperField}, {"city", Field::kCity}}; }
@@ -136,8 +137,9 @@ class SimulatorNode {
   }
 
   void on_command(const geometry_msgs::Twist& message) {
-    if (!std::isfinite(message.linear.x) || !std::isfinite(message.angular.z)) {
-      ROS_WARN_STREAM_THROTTLE(5.0, "cmd_vel left out: not finite");
+    // A finite one may be as bad: what it moves the robot by adds up to what no number holds, and stays there.
+    if (!(std::abs(message.linear.x) <= kMaxCommand) || !(std::abs(message.angular.z) <= kMaxCommand)) {
+      ROS_WARN_STREAM_THROTTLE(5.0, "cmd_vel left out: not finite, or beyond 1000 m/s or rad/s");
       return;
     }
     command_ = {message.linear.x, message.angular.z};

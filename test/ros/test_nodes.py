@@ -1,14 +1,19 @@
 #!/usr/bin/env python3
 """Each node by itself: bad parameters stop it with every fault listed; an interrupt ends it cleanly; it says what it
 waits for."""
+import math
 import os
 import signal
 import subprocess
+import sys
 import tempfile
+import time
 import unittest
 
 import rospy
 import rostest
+from geometry_msgs.msg import Twist, Vector3
+from nav_msgs.msg import Odometry
 
 NODES = {
     "particle_filter_node": (["_expert/ring_share:=2.0", "_expert/particle_count:=0", "_modus:=paper", "_mode:=papers"],
@@ -110,6 +115,29 @@ class NodesTest(unittest.TestCase):
             if "waiting for odometry" in line:
                 return
         self.fail("the node ended without saying what it waits for")
+
+    def test_the_simulated_robot_stays_where_an_absurd_command_finds_it(self):
+        odometry = []
+        rospy.Subscriber("odom", Odometry, odometry.append, queue_size=1000)
+        publisher = rospy.Publisher("cmd_vel", Twist, queue_size=10)
+        process = subprocess.Popen(command("simulator_node", "_expert/publish_clock:=false",
+                                           "_expert/wait_for_command:=false"), start_new_session=True)
+        self.addCleanup(os.killpg, process.pid, signal.SIGKILL)
+        deadline = time.monotonic() + 20.0
+        while not odometry or not publisher.get_num_connections():
+            self.assertLess(time.monotonic(), deadline, "no odometry")
+            time.sleep(0.05)
+        for value in (sys.float_info.max, -1e300, 1e4, math.inf, math.nan):
+            for odd in (Twist(linear=Vector3(x=value)), Twist(angular=Vector3(z=value))):
+                publisher.publish(odd)
+                seen = len(odometry)
+                while len(odometry) < seen + 4:
+                    self.assertLess(time.monotonic(), deadline, "no odometry after %g" % value)
+                    time.sleep(0.01)
+                for message in odometry[seen:]:
+                    numbers = (message.pose.pose.position.x, message.pose.pose.position.y, message.twist.twist.linear.x,
+                               *message.pose.covariance, *message.twist.covariance)
+                    self.assertTrue(all(math.isfinite(number) and abs(number) < 1e7 for number in numbers), value)
 
 
 if __name__ == "__main__":
