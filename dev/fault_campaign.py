@@ -23,6 +23,7 @@ import signal
 import sys
 import threading
 import time
+import xmlrpc.client
 
 import genpy.message
 
@@ -94,7 +95,7 @@ class Session:
         try:
             found = [self.master.subscriptions(node.name) for node in self.rig.nodes]
             publications = [self.master.publications(node.name) for node in self.rig.nodes]
-        except (OSError, TypeError):
+        except (OSError, TypeError, xmlrpc.client.Fault):  # it is not there yet, or not yet all there
             return False
         topics = {topic for each in found for topic in each}
         wanted = set(self.rig.answers)

@@ -19,7 +19,8 @@ namespace msgs = urban_gnss_localization;
 using visualization_msgs::Marker;
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr double kFreeRay_m = 40.0;  ///< drawn of a way that is free
+constexpr double kMaxVariance_m2 = 1e12;  ///< (1000 km)^2
+constexpr double kFreeRay_m = 40.0;       ///< drawn of a way that is free
 
 struct FloatField {
   std::uint32_t offset;
@@ -171,13 +172,14 @@ sensor_msgs::NavSatFix weighted_fix(const sensor_msgs::NavSatFix& fix, const Gns
   const Eigen::Matrix2d& horizontal = covariance.weighted;
   const auto claimed = claimed_covariance(fix);
   const double factor = claimed ? std::max(1.0, horizontal.trace() / claimed->trace()) : 1.0;
+  if (!std::isfinite(fix.altitude)) weighted.altitude = kNaN;  // which is NavSatFix's word for "none"
   const double up = fix.position_covariance[8];
   auto& c = weighted.position_covariance;
   c.fill(0.0);
   c[0] = horizontal(0, 0);
   c[1] = c[3] = horizontal(0, 1);
   c[4] = horizontal(1, 1);
-  c[8] = claimed && std::isfinite(up) && up > 0.0 ? factor * up : 2.0 * horizontal.trace();
+  c[8] = claimed && std::isfinite(up) && up > 0.0 ? std::min(factor * up, kMaxVariance_m2) : 2.0 * horizontal.trace();
   weighted.position_covariance_type = sensor_msgs::NavSatFix::COVARIANCE_TYPE_KNOWN;
   return weighted;
 }
