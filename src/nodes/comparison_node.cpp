@@ -47,6 +47,12 @@ class ComparisonNode {
           node, names_[i] + "/" + topics::kEstimate, 1000,
           [this, i](const auto& message) { history_.add_estimate(i, to_timed_pose(*message)); }));
     }
+    five_second_timer_ = io_.every(node, 5.0, "the node's timer", [this] {
+      if (!history_.has_truth()) {
+        log_.warn("waiting for the truth (" + subscribers_.front().getTopic() + ": " +
+                  std::to_string(subscribers_.front().getNumPublishers()) + " publishers)");
+      }
+    });
     timer_ = io_.every(node, 1.0 / parameters_.plot_rate, "the plot's timer", [this] { publish(); });
   }
 
@@ -77,6 +83,7 @@ class ComparisonNode {
   ros::Publisher publisher_;
   std::vector<ros::Subscriber> subscribers_;
   ros::WallTimer timer_;
+  ros::WallTimer five_second_timer_;
 };
 
 }  // namespace

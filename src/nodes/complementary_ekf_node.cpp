@@ -41,9 +41,8 @@ class ComplementaryEkfNode {
   }
 
   void watch_gate() {
-    if (!filter().is_gate_inert()) return;
-    ROS_WARN_STREAM("gate inert: the fixes scatter far less than their covariance says; a bias below "
-                    << filter().smallest_detectable_jump_m() << " m is not found at once");
+    if (!node_.pipeline().report().is_gate_inert) return;
+    ROS_WARN_STREAM("gate inert: a bias below " << filter().smallest_detectable_jump_m() << " m is not found at once");
   }
 
   RegisteredLocalizerNode node_;

@@ -27,6 +27,10 @@ class GpsdNode {
     diagnostics_.add("gpsd", this, &GpsdNode::diagnose);
     second_timer_ = node.createWallTimer(ros::WallDuration(1.0),
                                          [this](const ros::WallTimerEvent&) { diagnostics_.force_update(); });
+    five_second_timer_ = node.createWallTimer(ros::WallDuration(5.0), [this](const ros::WallTimerEvent&) {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      if (is_connected_ && is_silent()) ROS_WARN_STREAM("waiting for solutions of gpsd at " << server());
+    });
     reader_ = std::thread([this] { read_until_stopped(); });
   }
   ~GpsdNode() {
@@ -88,13 +92,18 @@ class GpsdNode {
     if (!output.fixes.empty()) last_ = ros::WallTime::now();
   }
 
+  /// Requires the lock.
+  bool is_silent() const {
+    constexpr double kSilence_s = 5.0;
+    return last_.isZero() || (ros::WallTime::now() - last_).toSec() > kSilence_s;
+  }
+
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
     using diagnostic_msgs::DiagnosticStatus;
     const std::lock_guard<std::mutex> lock(mutex_);
-    constexpr double kSilence_s = 5.0;
     if (!is_connected_) {
       status.summary(DiagnosticStatus::ERROR, "no gpsd at " + server());
-    } else if (last_.isZero() || (ros::WallTime::now() - last_).toSec() > kSilence_s) {
+    } else if (is_silent()) {
       status.summary(DiagnosticStatus::WARN, "gpsd reports no solutions: has it a device? (gpsd -n, cgps)");
     } else if (decoder_.mode() < 2) {
       status.summary(DiagnosticStatus::WARN, "the receiver has no fix");
@@ -123,6 +132,7 @@ class GpsdNode {
   ReceiverPublishers publishers_;
   diagnostic_updater::Updater diagnostics_;
   ros::WallTimer second_timer_;
+  ros::WallTimer five_second_timer_;
   std::atomic<bool> is_stopped_{false};
   std::thread reader_;
 };

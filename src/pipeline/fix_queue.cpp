@@ -1,11 +1,17 @@
 #include "urban_gnss_localization/pipeline/fix_queue.hpp"
 
+#include <chrono>
 #include <utility>
 
 #include "limits.hpp"
 #include "urban_gnss_localization/gnss/position_hint.hpp"
 
 namespace urban_gnss {
+namespace {
+
+constexpr Stamp kSaidAgain = std::chrono::minutes(1);
+
+}  // namespace
 
 std::optional<FixOutcome> FixQueue::add(const RawFix& fix) {
   SaneFix sane = sanity_.add(fix);
@@ -30,6 +36,7 @@ std::vector<FixOutcome> FixQueue::validate(const LocalFrame& frame) {
       outcome.covariance_clamped = true;
       outcome.reason = raw.reason + (outcome.reason.empty() ? "" : "; ") + outcome.reason;
     }
+    if (outcome.covariance_clamped) note_clamped(outcome);
     last_stamp_ = raw.fix.stamp;
     push_bounded(validated_, std::move(fix));
   }
@@ -42,9 +49,20 @@ ValidatedFix FixQueue::pop() {
   return fix;
 }
 
+void FixQueue::note_clamped(const FixOutcome& outcome) {
+  ++clamped_;
+  const bool is_due = !said_clamped_ || outcome.stamp < *said_clamped_ || outcome.stamp - *said_clamped_ >= kSaidAgain;
+  if (!is_due) return;
+  events_.push_back({PipelineEvent::Level::kWarn, "the covariance of " + std::to_string(clamped_) +
+                                                      (clamped_ == 1 ? " fix" : " fixes") +
+                                                      " was not used as declared: " + outcome.reason});
+  said_clamped_ = outcome.stamp;
+  clamped_ = 0;
+}
+
 std::vector<PipelineEvent> FixQueue::take_events() {
   using Level = PipelineEvent::Level;
-  std::vector<PipelineEvent> events;
+  std::vector<PipelineEvent> events = std::exchange(events_, {});
   for (FixSanity::News& news : sanity_.take_news()) {
     events.push_back({news.is_warning ? Level::kWarn : Level::kInfo, std::move(news.text)});
   }

@@ -63,7 +63,8 @@ void LocalizationPipeline::add_odometry(const OdometrySample& message) {
   process_fixes();
   if (!initialized()) return;
   const PoseEstimate published = estimate();
-  if (guard_state(estimate_fault(published))) outputs_.push_back({sample.stamp, published, sample.pose, twist});
+  if (guard_state(estimate_fault(published)))
+    outputs_.push_back({sample.stamp, published, sample.pose, twist, starts_});
 }
 
 void LocalizationPipeline::doubt_motion(const MotionDoubt& doubt) {

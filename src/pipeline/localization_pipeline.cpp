@@ -58,6 +58,7 @@ void LocalizationPipeline::reset(const std::string& why) {
   compared_velocity_.reset();
   velocities_.reset();
   fixes_.reset();
+  fix_rate_.reset();
   delay_.reset();
   satellites_.reset();
   residuals_.reset();
@@ -65,6 +66,7 @@ void LocalizationPipeline::reset(const std::string& why) {
   start_.reset();
   integrity_.reset();
   reporter_.reset();
+  is_gate_inert_ = false;
   if (frame()) event(Level::kInfo, datum_.describe());
 }
 
@@ -76,7 +78,10 @@ StampVerdict LocalizationPipeline::judge(InputStream stream, Stamp stamp, const 
 }
 
 void LocalizationPipeline::restart(InputStream stream) {
-  if (stream == InputStream::kFixes) fixes_.reset();
+  if (stream == InputStream::kFixes) {
+    fixes_.reset();
+    fix_rate_.reset();
+  }
   if (stream == InputStream::kVelocities) velocities_.reset();
 }
 
@@ -142,9 +147,9 @@ void LocalizationPipeline::add_fix(const RawFix& fix) {
         [this, fix](const std::string& why) { refuse_fix(fix.stamp, why); });
     if (verdict == StampVerdict::kOdd) return;
     place_ = fix.position;
+    if (verdict == StampVerdict::kNew) watch_rate(fix.stamp);
   }
   const auto rejected = fixes_.add(fix);
-  for (PipelineEvent& mistake : fixes_.take_events()) events_.push_back(std::move(mistake));
   if (rejected) {
     if (rejected->decision == FixDecision::kRejectedStale) note_unset_stamp(InputStream::kFixes, fix.stamp);
     decide(*rejected);
@@ -164,9 +169,19 @@ void LocalizationPipeline::refuse_fix(Stamp stamp, const std::string& reason) {
   decide_stale(std::move(outcome), reason);
 }
 
+void LocalizationPipeline::watch_rate(Stamp fix) {
+  const std::string news = fix_rate_.add(fix);
+  if (!news.empty()) {
+    event(Level::kWarn, "gps/fix comes at another rate, " + news + ": do two sources publish it, or does one pause?");
+  }
+}
+
 void LocalizationPipeline::process_fixes() {
+  std::vector<FixOutcome> rejected;
+  if (frame()) rejected = fixes_.validate(*frame());
+  for (PipelineEvent& mistake : fixes_.take_events()) events_.push_back(std::move(mistake));
+  for (FixOutcome& each : rejected) decide(std::move(each));
   if (!frame()) return;
-  for (FixOutcome& rejected : fixes_.validate(*frame())) decide(std::move(rejected));
   while (process_next_fix()) {
   }
 }
@@ -265,7 +280,15 @@ void LocalizationPipeline::correct_with(const ValidatedFix& fix) {
   if (outcome.decision == FixDecision::kAccepted) outcome.decision = fix.outcome.decision;
   if (outcome.reason.empty()) outcome.reason = fix.outcome.reason;
   decide(std::move(outcome));
+  watch_gate();
   guard_state(estimate_fault(localizer_->estimate()));
+}
+
+void LocalizationPipeline::watch_gate() {
+  const bool is_inert = reporter_.is_gate_inert(*localizer_);
+  if (is_inert == std::exchange(is_gate_inert_, is_inert)) return;
+  event(is_inert ? Level::kWarn : Level::kInfo,
+        is_inert ? "gate inert: the fixes scatter far less than their covariance says" : "the gate works again");
 }
 
 void LocalizationPipeline::watch_integrity(const ValidatedFix& fix, const Eigen::Vector2d& antenna_in_body) {
@@ -318,6 +341,7 @@ void LocalizationPipeline::start_from(const Start& start) {
   Eigen::Vector2d moved = Eigen::Vector2d::Zero();
   if (initialized() && !start.is_told) moved = start.estimate.pose.position() - localizer_->pose().position();
   localizer_->initialize(start.estimate);
+  ++starts_;
   start_.note(start);
   integrity_.restart(start.is_told, moved);
   speed_.forget_heading();

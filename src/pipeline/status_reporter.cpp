@@ -11,6 +11,7 @@ namespace urban_gnss {
 namespace {
 
 constexpr double kLeastClusterMass = 0.5;
+constexpr char kInertGate[] = "gate inert: the fixes scatter far less than their covariance says";
 
 LocalizationState state_before_start(const PipelineStatus& status) {
   if (status.is_lost) return LocalizationState::kLost;
@@ -42,6 +43,7 @@ const char* to_string(LocalizationState state) {
 
 void StatusReporter::count(const FixOutcome& outcome) {
   counts_.last_fix = outcome;
+  if (outcome.decision != FixDecision::kBiasCompensated && std::isfinite(outcome.nis)) gate_.add(outcome.nis);
   if (is_rejected(outcome.decision)) {
     ++counts_.fixes_rejected;
     return;
@@ -85,6 +87,7 @@ LocalizationReport StatusReporter::report(const PipelineStatus& status, const Lo
     return report;
   }
   report.health = localizer.health();
+  report.is_gate_inert = is_gate_inert(localizer);
   if (std::isfinite(report.health.bias_radius_m)) report.bias_radius_m = report.health.bias_radius_m;
   report.position_sigma_m =
       largest_sigma(localizer.estimate().covariance.topLeftCorner<2, 2>() + status.contradiction_m2);
@@ -101,7 +104,9 @@ void StatusReporter::judge(const PipelineStatus& status, LocalizationReport& rep
                                 : LocalizationState::kTracking;
   report.reason = complaint(status, report);
   report.healthy = report.reason.empty();
-  if (report.healthy) report.reason = status.receiver_note;
+  if (!report.healthy) return;
+  report.reason = status.receiver_note;
+  if (report.reason.empty() && report.is_gate_inert) report.reason = kInertGate;
 }
 
 std::string StatusReporter::complaint(const PipelineStatus& status, const LocalizationReport& report) const {

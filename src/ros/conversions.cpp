@@ -223,9 +223,9 @@ geometry_msgs::TransformStamped to_transform(const Pose2& pose, const ros::Time&
   return transform;
 }
 
-geometry_msgs::TransformStamped to_map_to_odom(const LocalizationOutput& output, const Frames& frames,
+geometry_msgs::TransformStamped to_map_to_odom(const Pose2& map_to_odometry, Stamp stamp, const Frames& frames,
                                                double offset_s) {
-  return to_transform(map_to_odometry(output), to_ros(output.stamp + from_seconds(offset_s)), frames.map, frames.odom);
+  return to_transform(map_to_odometry, to_ros(stamp + from_seconds(offset_s)), frames.map, frames.odom);
 }
 
 msgs::FixDecision to_message(const FixOutcome& outcome) {

@@ -1,5 +1,7 @@
 #include "urban_gnss_localization/ros/input_watch.hpp"
 
+#include <utility>
+
 namespace urban_gnss {
 namespace {
 
@@ -7,24 +9,22 @@ constexpr std::size_t kLongestName = 50;  ///< that is written
 
 }  // namespace
 
-bool InputWatch::observe_frame(const std::string& frame) {
-  if (frame.empty()) return false;
-  const bool has_changed = !frame_.empty() && frame != frame_;
-  if (has_changed) {
-    const auto name = [](const std::string& id) { return "'" + id.substr(0, kLongestName) + "'"; };
-    log_.warn(topic() + ": frame_id changed from " + name(frame_) + " to " + name(frame) +
-              "; are two sources publishing?");
-  }
-  frame_ = frame;
-  return has_changed;
+void InputWatch::say(const std::string& warning) {
+  if (!warning.empty()) log_.warn(topic() + ": " + warning);
 }
 
-void InputWatch::check_publishers() {
-  const std::uint32_t count = publishers();
-  if (count > 1 && !warned_of_publishers_) {
-    log_.warn(topic() + ": " + std::to_string(count) + " publishers; fixes and odometry of two sources do not mix");
-  }
-  warned_of_publishers_ = count > 1;
+std::string InputWatch::fault_of_frame(const std::string& frame) {
+  const auto name = [](const std::string& id) { return "'" + id.substr(0, kLongestName) + "'"; };
+  if (frame.empty()) return {};
+  const std::string before = std::exchange(frame_, frame);
+  if (before.empty() || frame == before) return {};
+  return "frame_id changed from " + name(before) + " to " + name(frame) + "; are two sources publishing?";
+}
+
+std::string InputWatch::fault_of_publishers(std::uint32_t count) {
+  const bool was_said = std::exchange(warned_of_publishers_, count > 1);
+  if (count <= 1 || was_said) return {};
+  return std::to_string(count) + " publishers; fixes and odometry of two sources do not mix";
 }
 
 }  // namespace urban_gnss

@@ -20,6 +20,7 @@ LocalizerNode::LocalizerNode(ros::NodeHandle& node, ros::NodeHandle& private_nod
     : parameters_(parameters),
       pipeline_(parameters.localization, std::move(localizer)),
       on_output_(std::move(on_output)),
+      slew_(parameters.slew),
       sensor_frames_(parameters.frames, parameters.wants_antenna_from_tf()),
       diagnostics_(ros::NodeHandle(), private_node) {
   const std::string fused = why_not_a_receiver(node.resolveName(topics::kFix));
@@ -218,7 +219,8 @@ void LocalizerNode::publish_output(const LocalizationOutput& output) {
   if (!io_.publish(estimate_publisher_, to_message(output, frames))) return;
   ++outputs_;
   io_.publish(fix_publisher_, to_fix_message(output, *pipeline_.frame(), frames));
-  const auto map_to_odom = to_map_to_odom(output, frames, parameters_.transform_time_offset);
+  const auto map_to_odom =
+      to_map_to_odom(slew_.follow(output), output.stamp, frames, parameters_.transform_time_offset);
   if (parameters_.publish_tf && io_.lets_out("/tf", map_to_odom)) broadcaster_.sendTransform(map_to_odom);
   if (on_output_) on_output_(output);
 }
@@ -263,7 +265,7 @@ void LocalizerNode::every_five_seconds() {
 void LocalizerNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
   const LocalizationReport report = pipeline_.report();
   using diagnostic_msgs::DiagnosticStatus;
-  const auto level = report.healthy                             ? DiagnosticStatus::OK
+  const auto level = report.healthy && !report.is_gate_inert    ? DiagnosticStatus::OK
                      : report.state == LocalizationState::kLost ? DiagnosticStatus::ERROR
                                                                 : DiagnosticStatus::WARN;
   status.summary(level, report.healthy && report.reason.empty() ? "tracking" : report.reason);
@@ -280,10 +282,11 @@ void LocalizerNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status
   status.add("protection level (m)", report.protection_level_m);
   status.add("heading sigma (rad)", report.health.heading_sigma_rad);
   status.add("bias radius (m)", report.bias_radius_m);
-  status.add("gate inert", report.health.is_gate_inert);
+  status.add("gate inert", report.is_gate_inert);
   status.add("effective sample size", report.health.effective_sample_size);
   status.add("cluster mass", report.health.cluster_mass);
   status.add("estimates published", outputs_);
+  status.add("tf behind the estimate (m)", slew_.behind_m());
   status.add("odd stamps left out", pipeline_.odd_stamps());
   status.add("broken states", pipeline_.broken_states());
   io_.diagnose(status);

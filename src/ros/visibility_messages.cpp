@@ -63,6 +63,18 @@ boost::array<double, 4> row_major(const Eigen::Matrix2d& matrix) {
   return values;
 }
 
+/// "7 of 12 satellites" above the antenna: those that are visible, of those that are used.
+Marker satellite_count(const Eigen::Vector3d& antenna, const msgs::Visibility& visibility, const ros::Time& time,
+                       const std::string& frame) {
+  constexpr double kAbove_m = 4.0;
+  Marker text = make_marker("satellite_count", 0, Marker::TEXT_VIEW_FACING, {1.0F, 1.0F, 1.0F, 1.0F}, time, frame);
+  text.pose.position = point(antenna + kAbove_m * Eigen::Vector3d::UnitZ());
+  text.scale.z = 2.0;
+  text.text = std::to_string(visibility.satellites_visible) + " of " + std::to_string(visibility.satellites_used) +
+              " satellites";
+  return text;
+}
+
 std::uint8_t visibility_class(const SatelliteAssessment& assessment, const SatelliteObservation& satellite,
                               bool has_map) {
   if (!assessment.is_used) return msgs::SatelliteVisibility::NOT_USED;
@@ -231,6 +243,7 @@ visualization_msgs::MarkerArray ray_markers(const FixAssessment& assessment, con
   Marker clear = make_marker("", 0, Marker::SPHERE, {0.0F, 0.0F, 0.0F, 0.0F}, time, frame);
   clear.action = Marker::DELETEALL;  // satellites set
   markers.markers.push_back(clear);
+  markers.markers.push_back(satellite_count(assessment.antenna.position, visibility, time, frame));
   if (!assessment.has_map) return markers;
   const Eigen::AngleAxisd turn(assessment.antenna.east_yaw_rad, Eigen::Vector3d::UnitZ());
   const Eigen::Vector3d& from = assessment.antenna.position;

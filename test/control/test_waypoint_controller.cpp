@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <sstream>
 
 #include "matchers.hpp"
 #include "package_directory.hpp"
@@ -123,6 +125,36 @@ TEST(WaypointController, GeographicTargetsAreRefusedWithTheirIndex) {
   EXPECT_NE(fault({}, {48.1}).find("latitude and longitude of each"), std::string::npos);
   EXPECT_NE(fault({}, {48.1, 11.5, 91.0, 11.5}).find("target 1: latitude = 91"), std::string::npos);
   EXPECT_NE(fault({}, {48.1, 190.0}).find("target 0: longitude = 190"), std::string::npos);
+}
+
+TEST(WaypointController, EveryParameterHasAnEffect) {
+  // What the robot does, closed loop without noise, from beside the first target.
+  const auto trace = [](const std::string& change) {
+    const std::string drive = change.find("geographic") != std::string::npos
+                                  ? "{laps: 2}"
+                                  : "{targets: [10.0, 0.0, 10.0, 10.0, 0.0, 10.0, 0.0, 0.0], laps: 2}";
+    const LocalFrame map({48.1374, 11.5755, 520.0});
+    const WaypointControllerParameters p = with(with(WaypointControllerParameters{}, drive), change).in_map(map);
+    WaypointController controller(p);
+    Pose2 pose;
+    std::ostringstream out;
+    for (int k = 0; k < 3000; ++k) {
+      const BicycleInput input = controller.steer(pose);
+      out << input.speed_mps << ' ' << input.steering_rad << ' ' << controller.current_target() << '\n';
+      pose = move(pose, {input.speed_mps, yaw_rate(input, p.wheelbase)}, 0.01);
+    }
+    return out.str();
+  };
+  const std::map<std::string, std::string> changes = {
+      {"speed", "2.0"},           {"steering_gain", "0.3"},
+      {"max_steering", "0.2"},    {"wheelbase", "3.0"},
+      {"switch_distance", "4.0"}, {"laps", "1"},
+      {"targets", "[9.0, 0.0]"},  {"geographic", "[[48.1375, 11.5755]]"},
+  };
+  for (const std::string& name : parameter_names(WaypointControllerParameters{})) {
+    ASSERT_EQ(changes.count(name), 1u) << name << " is not examined";
+    EXPECT_NE(trace(name + ": " + changes.at(name)), trace("{}")) << name;
+  }
 }
 
 TEST(WaypointController, ATargetThatNoRobotReachesIsRefused) {

@@ -6,8 +6,8 @@
 #include <utility>
 
 #include "matchers.hpp"
-#include "urban_gnss_localization/localizers/kim/bias_detector.hpp"
 #include "urban_gnss_localization/gnss/chi_squared.hpp"
+#include "urban_gnss_localization/localizers/kim/bias_detector.hpp"
 
 namespace urban_gnss {
 namespace {
@@ -92,21 +92,6 @@ TEST(BiasDetector, SpikeIsNoRamp) {
   EXPECT_TRUE(detection.is_jump);
   EXPECT_FALSE(detection.is_ramp);
   EXPECT_EQ(detector.sums().maxCoeff(), 0.0);
-}
-
-TEST(BiasDetector, GateThatFindsNothingIsCalledInert) {
-  BiasDetectorParameters parameters;
-  BiasDetector detector(parameters);
-  RandomEngine engine = make_engine(3);
-  bool inert = false;
-  for (int k = 0; k < 1000; ++k) inert = inert || detector.test(draw(tilted(), engine), tilted()).is_inert;
-  EXPECT_FALSE(inert);
-  for (int k = 1; k <= parameters.inert_window; ++k) {
-    inert = detector.test(0.1 * draw(tilted(), engine), tilted()).is_inert;
-  }
-  EXPECT_TRUE(inert);
-  detector.reset();
-  EXPECT_FALSE(detector.test({0.0, 0.0}, tilted()).is_inert) << "one fix is no run";
 }
 
 TEST(BiasDetector, SmallestDetectableJumpIsFoundWithItsPower) {

@@ -235,7 +235,7 @@ std::string trace(const std::string& yaml) {
     const auto note = [&](const FixMeasurement&) {
       text << drive.filter.pose().x << ' ' << drive.filter.smallest_detectable_jump_m() << ' '
            << drive.filter.error_covariance()(2, 2) << ' ' << drive.filter.estimate().covariance(0, 0) << ' '
-           << to_string(drive.last.decision) << drive.last.reason << drive.filter.is_gate_inert() << '\n';
+           << to_string(drive.last.decision) << drive.last.reason << '\n';
     };
     drive.run(60.0, note);
     for (const Eigen::Vector2d& bias : {Eigen::Vector2d(15.0, 0.0), Eigen::Vector2d(0.0, -30.0)}) {
@@ -282,12 +282,10 @@ TEST(ComplementaryEkfParameters, EachHasAnEffect) {
       other = "dead_reckoning";
     } else if (value == "true" || value == "false") {
       other = value == "true" ? "false" : "true";
-    } else if (name == "close_count" || name == "inert_window") {
+    } else if (name == "close_count") {
       other = std::to_string(std::stoi(value) / 2);
     } else if (name == "gate_probability" || name == "close_probability") {
       other = "0.6";
-    } else if (name == "inert_probability") {
-      other = "0.09";
     } else if (name.rfind("common_error", 0) == 0) {
       other = name == "common_error_min" ? "0.9" : "1.0";
     } else if (name == "reacquisition_gap") {

@@ -126,6 +126,26 @@ TEST(FixQueue, ParametersAreThoseOfTheValidation) {
   EXPECT_NEAR(queue.next()->fix.covariance(0, 0), 4.0, 1e-12) << "kept by the reset";
 }
 
+TEST(FixQueue, AClampedCovarianceIsSaidOnceAMinute) {
+  FixQueue queue({});
+  std::vector<std::string> said;
+  const auto add = [&](double time, double sigma) {
+    queue.add(raw_fix(from_seconds(time), {0.0, 0.0}, sigma));
+    queue.validate(kFrame);
+    for (const PipelineEvent& event : queue.take_events()) {
+      if (event.level == PipelineEvent::Level::kWarn) said.push_back(event.text);
+    }
+  };
+  for (int k = 1; k <= 30; ++k) add(k, 1.0);
+  EXPECT_TRUE(said.empty());
+  for (int k = 31; k <= 131; ++k) add(k, 0.003);
+  ASSERT_EQ(said.size(), 2u) << "at 31 s and at 91 s";
+  EXPECT_NE(said[0].find("covariance of 1 fix was not used as declared: declared sigma 0.003 m raised"),
+            std::string::npos)
+      << said[0];
+  EXPECT_NE(said[1].find("covariance of 60 fixes"), std::string::npos) << said[1];
+}
+
 TEST(FixQueue, OfTooManyTheOldestAreDropped) {
   for (const bool has_datum : {false, true}) {
     FixQueue queue({});

@@ -299,6 +299,21 @@ TEST(LocalizationPipeline, TracksWithTheInteractingModels) {
   EXPECT_EQ(rig.state(), LocalizationState::kTracking);
 }
 
+TEST(LocalizationPipeline, AnInertGateIsToldOnceAndSoIsItsEnd) {
+  Rig rig(kGiven);
+  rig.fake->gated = true;
+  rig.fake->nis = 0.01;
+  rig.run(0.0, 29.0);
+  EXPECT_FALSE(has_event(rig.pipeline, PipelineEvent::Level::kWarn, "gate inert"));
+  rig.run(29.1, 40.0);
+  EXPECT_TRUE(has_event(rig.pipeline, PipelineEvent::Level::kWarn, "gate inert"));
+  EXPECT_TRUE(rig.pipeline.report().is_gate_inert);
+  rig.fake->nis = 20.0;
+  rig.run(40.1, 50.0);
+  EXPECT_TRUE(has_event(rig.pipeline, PipelineEvent::Level::kInfo, "the gate works again"));
+  EXPECT_FALSE(rig.pipeline.report().is_gate_inert);
+}
+
 TEST(LocalizationPipeline, ParametersAreChecked) {
   std::vector<std::string> faults;
   faults = faults_of(LocalizationParameters{});

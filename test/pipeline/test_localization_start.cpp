@@ -18,7 +18,9 @@ TEST(LocalizationPipeline, DatumComesFromAgreeingFixesWhichAreThenUsed) {
   rig.fix(0.8);
   ASSERT_TRUE(rig.pipeline.frame());
   rig.drive(0.8);
-  EXPECT_EQ(rig.pipeline.take_outcomes().size(), 5u);  // those that waited, and the last
+  const std::vector<FixOutcome> outcomes = rig.pipeline.take_outcomes();
+  EXPECT_EQ(outcomes.size(), 5u);  // those that waited, and the last
+  for (const FixOutcome& each : outcomes) EXPECT_EQ(each.decision, FixDecision::kNotExamined);
   EXPECT_EQ(rig.state(), LocalizationState::kInitializing);
   // The median of the five places is the third.
   EXPECT_LT(rig.pipeline.frame()->to_local(raw_fix({}, Rig::truth(0.4).position()).position).norm(), 1e-2);

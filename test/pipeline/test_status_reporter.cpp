@@ -96,6 +96,34 @@ TEST(StatusReporter, BiasRadiusIsNoNumberWhereNoneIsKnown) {
   EXPECT_EQ(well.report().bias_radius_m, 3.0);
 }
 
+TEST(StatusReporter, AnInertGateIsSaidOfALocalizerThatHasOne) {
+  Well well;
+  FixOutcome outcome;
+  outcome.decision = FixDecision::kBiasCompensated;
+  outcome.nis = 0.01;
+  outcome.stamp = from_seconds(110.0);
+  well.localizer.gated = true;
+  for (int k = 0; k < 100; ++k) well.reporter.count(outcome);
+  EXPECT_FALSE(well.report().is_gate_inert) << "the NIS is that of a bias that was estimated";
+  outcome.decision = FixDecision::kAccepted;
+  for (int k = 0; k < 100; ++k) well.reporter.count(outcome);
+  EXPECT_TRUE(well.report().is_gate_inert);
+  EXPECT_TRUE(well.report().healthy);
+  EXPECT_NE(well.report().reason.find("gate inert"), std::string::npos) << well.report().reason;
+  well.localizer.gated = false;
+  EXPECT_FALSE(well.report().is_gate_inert);
+  EXPECT_EQ(well.report().reason, "");
+}
+
+TEST(StatusReporter, ParticlesThatDisagreeAreNotWell) {
+  Well well;
+  well.localizer.mass = 0.6;
+  EXPECT_TRUE(well.report().healthy);
+  well.localizer.mass = 0.4;
+  EXPECT_FALSE(well.report().healthy);
+  EXPECT_NE(well.report().reason.find("particles disagree"), std::string::npos) << well.report().reason;
+}
+
 TEST(StatusReporter, HealthNamesWhatIsWrongFirst) {
   Well well;
   EXPECT_TRUE(well.report().healthy) << well.report().reason;

@@ -6,7 +6,6 @@
 #include <stdexcept>
 
 #include "urban_gnss_localization/ros/conversions.hpp"
-#include "urban_gnss_localization/ros/input_watch.hpp"
 #include "urban_gnss_localization/ros/node_shell.hpp"
 #include "urban_gnss_localization/ros/sensor_frames.hpp"
 
@@ -78,15 +77,6 @@ TEST(NodeShell, NothingThatIsThrownEscapesAndItIsCounted) {
   EXPECT_EQ(diagnosis.value("last error"), "odom failed: an exception of unknown type");
 }
 
-TEST(InputWatch, AFrameThatIsNotToldIsNoOther) {
-  EventLog log;
-  InputWatch watch(log);
-  for (const char* frame : {"", "gps", "", "gps"}) EXPECT_FALSE(watch.observe_frame(frame)) << "'" << frame << "'";
-  EXPECT_TRUE(watch.observe_frame("other"));
-  EXPECT_FALSE(watch.observe_frame(""));
-  EXPECT_TRUE(watch.observe_frame("gps"));
-}
-
 TEST(SensorFrames, AFixWithoutFrameDoesNotForgetTheAntennas) {
   SensorFrames frames(Frames{}, true);
   frames.observe_fix("gps");
@@ -115,7 +105,7 @@ TEST(NodeShell, WhatIsNoEstimateDoesNotGoOut) {
   EXPECT_FALSE(shell.lets_out("odometry/filtered", to_message(moving, Frames{})));
   LocalizationOutput lost = output;
   lost.estimate.pose.yaw = kNaN;
-  EXPECT_FALSE(shell.lets_out("tf", to_map_to_odom(lost, Frames{}, 0.0)));
+  EXPECT_FALSE(shell.lets_out("tf", to_map_to_odom(lost.estimate.pose, lost.stamp, Frames{}, 0.0)));
   BiasEstimate bias;
   EXPECT_TRUE(shell.lets_out("gps/bias", to_message(bias, "map")));
   bias.radius_m = kNaN;

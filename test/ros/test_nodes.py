@@ -39,6 +39,18 @@ NODES = {
 }
 
 
+# Of each node that waits for something: arguments, and what it says.
+WAITING = {
+    "particle_filter_node": ([], "waiting for odometry"),
+    "gps_bias_node": ([], "waiting for"),
+    "occlusion_node": ([], "waiting for fixes"),
+    "waypoint_controller_node": (["_targets:=[1.0, 2.0]"], "waiting for an estimate"),
+    "comparison_node": ([], "waiting for the truth"),
+    "receiver_node": (["_receiver:=ublox"], "no message of the receiver"),
+    "gpsd_node": (["_port:=1"], "no gpsd at"),
+}
+
+
 def command(node, *arguments):
     return ["rosrun", "urban_gnss_localization", node, "__name:=tested_" + node, *arguments]
 
@@ -107,14 +119,16 @@ class NodesTest(unittest.TestCase):
         return {name for _, names in publishers + subscribers for name in names}
 
     def test_says_what_it_waits_for(self):
-        """Within some seconds, without any input."""
-        process = subprocess.Popen(command("particle_filter_node"), start_new_session=True, stdout=subprocess.PIPE,
-                                   stderr=subprocess.STDOUT, universal_newlines=True)
-        self.addCleanup(os.killpg, process.pid, signal.SIGKILL)
-        for line in process.stdout:
-            if "waiting for odometry" in line:
-                return
-        self.fail("the node ended without saying what it waits for")
+        """Every node that waits, within some seconds, without any input."""
+        processes = {}
+        for node, (arguments, _) in WAITING.items():
+            processes[node] = subprocess.Popen(command(node, *arguments), start_new_session=True,
+                                               stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+                                               universal_newlines=True)
+            self.addCleanup(os.killpg, processes[node].pid, signal.SIGKILL)
+        for node, (_, awaited) in WAITING.items():
+            with self.subTest(node=node):
+                self.assertTrue(any(awaited in line for line in processes[node].stdout), "it ended without a word")
 
     def test_the_simulated_robot_stays_where_an_absurd_command_finds_it(self):
         odometry = []

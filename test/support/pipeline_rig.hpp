@@ -34,6 +34,9 @@ struct FakeLocalizer : Localizer {
   std::vector<VelocityMeasurement> velocities;
   std::vector<HeadingMeasurement> headings;
   bool takes_sky{true};  ///< satellites
+  bool gated{false};     ///< has a gate
+  double nis{kNaN};      ///< of each fix
+  double mass{kNaN};     ///< of the heaviest cluster
 
   const char* name() const override { return "fake"; }
   std::string mode() const override { return "fake"; }
@@ -56,8 +59,10 @@ struct FakeLocalizer : Localizer {
     if (breaks) state.pose.x = kNaN;
     FixOutcome outcome;
     outcome.decision = FixDecision::kAccepted;
+    outcome.nis = nis;
     return outcome;
   }
+  bool gates() const override { return gated; }
   bool takes_velocity() const override { return takes; }
   void correct_velocity(const VelocityMeasurement& velocity) override { velocities.push_back(velocity); }
   bool takes_heading() const override { return true; }
@@ -68,6 +73,7 @@ struct FakeLocalizer : Localizer {
   LocalizerHealth health() const override {
     LocalizerHealth health;
     health.heading_sigma_rad = std::sqrt(state.covariance(2, 2));
+    health.cluster_mass = mass;
     return health;
   }
 };

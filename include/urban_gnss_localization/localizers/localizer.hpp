@@ -60,7 +60,6 @@ struct LocalizerHealth {
   double cluster_mass{std::numeric_limits<double>::quiet_NaN()};
   std::uint32_t cluster_count{0};
   double bias_radius_m{std::numeric_limits<double>::quiet_NaN()};  ///< of the bias that it estimates itself
-  bool is_gate_inert{false};  ///< its gate passes everything, as the fixes' covariance is far too large
 };
 
 /// A pose filter of odometry and fixes in the map frame. It has no clock and no messages: the pipeline calls it in the
@@ -88,6 +87,10 @@ class Localizer {
 
   /// Takes one fix. The outcome carries the decision with its NIS.
   virtual FixOutcome correct(const FixMeasurement& fix) = 0;
+
+  /// Whether it refuses a fix, or weighs it down, because of its NIS alone; the NIS of its outcomes is then that of a
+  /// fix without a bias, unless the decision is kBiasCompensated.
+  virtual bool gates() const { return false; }
 
   /// Whether it makes use of the receiver's velocity.
   virtual bool takes_velocity() const { return false; }

@@ -33,7 +33,8 @@ class FixQueue {
   /// Of the fix that was validated last; nothing before the first.
   const std::optional<Stamp>& last_stamp() const { return last_stamp_; }
 
-  /// Mistakes of the driver, each once, also across reset().
+  /// Mistakes of the driver, each once, also across reset(). And once a minute at the most, by the stamps, that
+  /// covariances were replaced or clamped.
   std::vector<PipelineEvent> take_events();
   /// What is wrong with the covariance of the last fixes, for people; empty where nothing is.
   std::string complaint() const { return sanity_.complaint(); }
@@ -42,11 +43,17 @@ class FixQueue {
   void reset();
 
  private:
+  /// The covariance of a fix is not what its receiver declares.
+  void note_clamped(const FixOutcome& outcome);
+
   FixValidationParameters parameters_;
   FixSanity sanity_;
   std::deque<SaneFix> raw_;
   std::deque<ValidatedFix> validated_;
   std::optional<Stamp> last_stamp_;
+  std::optional<Stamp> said_clamped_;
+  std::size_t clamped_{0};  ///< since it was said
+  std::vector<PipelineEvent> events_;
 };
 
 }  // namespace urban_gnss

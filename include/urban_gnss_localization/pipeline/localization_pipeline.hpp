@@ -19,6 +19,7 @@
 #include "urban_gnss_localization/pipeline/map_datum.hpp"
 #include "urban_gnss_localization/pipeline/odometry_source.hpp"
 #include "urban_gnss_localization/pipeline/pipeline_event.hpp"
+#include "urban_gnss_localization/pipeline/rate_monitor.hpp"
 #include "urban_gnss_localization/pipeline/start_supervisor.hpp"
 #include "urban_gnss_localization/pipeline/status_reporter.hpp"
 #include "urban_gnss_localization/pipeline/stream_offsets.hpp"
@@ -33,6 +34,7 @@ struct LocalizationOutput {
   PoseEstimate estimate;  ///< base in the map frame
   Pose2 odometry_pose;    ///< base in the odometry frame, as the message said
   Twist2 twist;
+  std::size_t starts{0};  ///< of the localizer, up to here
 };
 
 /// The map frame's odometry origin: the transform map -> odom that makes the odometry's pose the estimated one.
@@ -163,6 +165,8 @@ class LocalizationPipeline {
   /// rad, by which what the receiver calls east is turned from the map's x axis, counter-clockwise.
   double convergence_rad() const { return place_ && frame() ? frame()->convergence_rad(*place_) : 0.0; }
 
+  /// Says where the fixes come at another rate than before.
+  void watch_rate(Stamp fix);
   void process_fixes();
   bool process_next_fix();
   /// Whether the fix should wait for its satellites or its bias.
@@ -191,6 +195,8 @@ class LocalizationPipeline {
   /// from the fixes.
   bool guard_state(const std::string& fault);
 
+  /// Says where the gate finds nothing any more, or finds something again.
+  void watch_gate();
   void decide_stale(FixOutcome outcome, const std::string& reason);
   void decide(FixOutcome outcome);
   void decide_unexamined(const ValidatedFix& fix, const std::string& reason, bool is_start);
@@ -208,6 +214,9 @@ class LocalizationPipeline {
   OdometryHistory history_;
   std::size_t epoch_{0};
   std::size_t broken_states_{0};
+  std::size_t starts_{0};
+  bool is_gate_inert_{false};
+  RateMonitor fix_rate_;
   OdometrySource odometry_;
   ImuLeveller imu_;
   YawRateSource yaw_rate_;

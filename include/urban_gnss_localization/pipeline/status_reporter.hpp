@@ -7,6 +7,7 @@
 
 #include "urban_gnss_localization/common/parameters.hpp"
 #include "urban_gnss_localization/gnss/fix_decision.hpp"
+#include "urban_gnss_localization/gnss/inert_gate.hpp"
 #include "urban_gnss_localization/localizers/localizer.hpp"
 
 namespace urban_gnss {
@@ -15,11 +16,13 @@ namespace urban_gnss {
 struct StatusParameters {
   double fix_timeout{10.0};
   double heading_converged_sigma{0.3};
+  InertGateParameters gate;
 
   void visit(ParameterVisitor& v) {
     v("fix_timeout", fix_timeout, positive(), "s", "time without a used fix after which the status is dead reckoning");
     v("heading_converged_sigma", heading_converged_sigma, positive(), "rad",
       "standard deviation of the heading below which it counts as known (~status, healthy)");
+    v.include(gate);
   }
 };
 
@@ -54,6 +57,7 @@ struct LocalizationReport {
   double time_to_recover_s{std::numeric_limits<double>::quiet_NaN()};  ///< IntegrityMonitor
   double fix_delay_s{0.0};                                             ///< FixDelayEstimator
   bool heading_converged{false};
+  bool is_gate_inert{false};  ///< the fixes scatter far less than they declare, so that the gate finds nothing
   double bias_radius_m{std::numeric_limits<double>::quiet_NaN()};
   LocalizerHealth health;
 };
@@ -82,10 +86,12 @@ class StatusReporter {
   /// `odometry_gap_s`: without odometry for longer than this, the localizer is not well. Requires parameters without
   /// faults.
   StatusReporter(const StatusParameters& parameters, double odometry_gap_s)
-      : parameters_(parameters), odometry_gap_s_(odometry_gap_s) {}
+      : parameters_(parameters), odometry_gap_s_(odometry_gap_s), gate_(parameters.gate) {}
 
   /// A fix was used or rejected.
   void count(const FixOutcome& outcome);
+  /// Whether a gate, if the localizer has one, finds nothing (InertGate).
+  bool is_gate_inert(const Localizer& localizer) const { return localizer.gates() && gate_.is_inert(); }
   /// A fix was not examined, as it went into the start; `is_start`: the localizer started with it.
   void note_start_fix(const FixOutcome& outcome, bool is_start);
   /// A fix waits for the datum.
@@ -107,6 +113,7 @@ class StatusReporter {
   double odometry_gap_s_;
   LocalizationReport counts_;  ///< of which the last fix and the counts are used
   std::optional<Stamp> last_used_;
+  InertGate gate_;
 };
 
 }  // namespace urban_gnss

@@ -90,8 +90,9 @@ inline constexpr double kUnobservedVariance = 1e6;
 /// variance `kUnobservedVariance`, since a planar filter does not estimate it. `map` is the map frame.
 sensor_msgs::NavSatFix to_fix_message(const LocalizationOutput& output, const LocalFrame& map, const Frames& frames);
 
-/// map -> odom, valid until `offset_s` after the output's stamp.
-geometry_msgs::TransformStamped to_map_to_odom(const LocalizationOutput& output, const Frames& frames, double offset_s);
+/// map -> odom, valid until `offset_s` after the stamp.
+geometry_msgs::TransformStamped to_map_to_odom(const Pose2& map_to_odometry, Stamp stamp, const Frames& frames,
+                                               double offset_s);
 geometry_msgs::TransformStamped to_transform(const Pose2& pose, const ros::Time& time, const std::string& parent,
                                              const std::string& child);
 

@@ -17,6 +17,7 @@
 #include <functional>
 #include <memory>
 
+#include "urban_gnss_localization/pipeline/correction_slew.hpp"
 #include "urban_gnss_localization/pipeline/localization_pipeline.hpp"
 #include "urban_gnss_localization/ros/conversions.hpp"
 #include "urban_gnss_localization/ros/event_log.hpp"
@@ -33,6 +34,7 @@ struct LocalizerNodeParameters {
   Frames frames;
   bool publish_tf{true};
   double transform_time_offset{0.0};
+  CorrectionSlewParameters slew;
   bool antenna_offset_from_tf{true};
   LocalizationParameters localization;
 
@@ -44,6 +46,7 @@ struct LocalizerNodeParameters {
     v.basic()("publish_tf", publish_tf, "whether map -> odom is broadcast; false where another localizer does");
     v("transform_time_offset", transform_time_offset, any_number(), "s",
       "time added to the stamp of map -> odom, so that users need not wait for the next");
+    v.include(slew);
     v("antenna_offset_from_tf", antenna_offset_from_tf,
       "whether antenna_offset is taken from tf (base_link -> the fix's frame_id) where it is [0, 0]");
     v.include(localization);
@@ -106,6 +109,7 @@ class LocalizerNode {
   OutputHook on_output_;
   EventLog log_;
   NodeShell io_{log_};
+  CorrectionSlew slew_;
   SensorFrames sensor_frames_;
   std::uint64_t outputs_{0};
 

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <boost/math/distributions/non_central_chi_squared.hpp>
 #include <cmath>
-#include <numeric>
 #include <stdexcept>
 
 #include "urban_gnss_localization/gnss/chi_squared.hpp"
@@ -16,14 +15,9 @@ double normalised_innovation_squared(const Eigen::Vector2d& innovation, const Ei
 }
 
 BiasDetector::BiasDetector(const BiasDetectorParameters& parameters)
-    : parameters_(parameters),
-      threshold_(chi_squared_quantile(parameters.gate_probability, kFixDof)),
-      inert_threshold_(chi_squared_quantile(parameters.inert_probability, kFixDof * parameters.inert_window)) {}
+    : parameters_(parameters), threshold_(chi_squared_quantile(parameters.gate_probability, kFixDof)) {}
 
-void BiasDetector::reset() {
-  sums_.setZero();
-  recent_nis_.clear();
-}
+void BiasDetector::reset() { sums_.setZero(); }
 
 BiasDetection BiasDetector::test(const Eigen::Vector2d& innovation, const Eigen::Matrix2d& covariance) {
   const Eigen::Vector2d whitened = covariance.llt().matrixL().solve(innovation);
@@ -38,12 +32,6 @@ BiasDetection BiasDetector::test(const Eigen::Vector2d& innovation, const Eigen:
     detection.is_ramp = sums_.maxCoeff() > parameters_.ramp_threshold;
     if (detection.is_ramp) sums_.setZero();
   }
-
-  recent_nis_.push_back(detection.nis);
-  const auto window = static_cast<std::size_t>(parameters_.inert_window);
-  if (recent_nis_.size() > window) recent_nis_.pop_front();
-  detection.is_inert =
-      recent_nis_.size() == window && std::accumulate(recent_nis_.begin(), recent_nis_.end(), 0.0) < inert_threshold_;
   return detection;
 }
 

@@ -40,7 +40,6 @@ void ComplementaryEkf::initialize(const PoseEstimate& start) {
   reacquisition_.reset();
   common_variance_m2_ = 0.0;
   insignificant_ = 0;
-  is_inert_ = false;
   run_.reset();
   heading_search_.reset();
   if (start.covariance(2, 2) > kUnknownHeading_rad * kUnknownHeading_rad)
@@ -89,7 +88,6 @@ void ComplementaryEkf::set_mode(ComplementaryMode mode) {
   filter_.set_state(ErrorState::Zero(),
                     initial_error_covariance(filter_.bias_free_covariance().topLeftCorner<3, 3>(), odometry_));
   common_variance_m2_ = 0.0;
-  is_inert_ = false;
 }
 
 FixOutcome ComplementaryEkf::correct(const FixMeasurement& fix) {
@@ -183,11 +181,9 @@ void ComplementaryEkf::decide(const Innovation& innovation, FixOutcome& outcome)
   }
   const BiasDetection detection = detector_.test(innovation.value, covariance);
   outcome.nis = detection.nis;
-  is_inert_ = detection.is_inert;
   if (parameters_.mode == ComplementaryMode::kStandard || !detection.is_biased()) {
     run_.reset();
     apply(innovation);
-    if (is_inert_) outcome.reason = "gate inert: the fixes scatter far less than their covariance says";
     return;
   }
   if (detection.is_ramp) outcome.reason = "the fixes drift away from the odometry";
@@ -366,7 +362,6 @@ LocalizerHealth ComplementaryEkf::health() const {
   LocalizerHealth health;
   health.heading_sigma_rad = std::sqrt(filter_.compensated_covariance()(2, 2));
   health.bias_radius_m = bias().norm();
-  health.is_gate_inert = is_inert_;
   return health;
 }
 

@@ -128,8 +128,7 @@ void ParticleFilter::examine(const FixMeasurement& fix, FixOutcome& outcome) con
 }
 
 bool ParticleFilter::is_gated(const FixMeasurement& fix, FixOutcome& outcome) {
-  if (wants_bias() || parameters_.is_as_printed()) return false;
-  if (parameters_.gate_probability >= 1.0 || outcome.nis <= nis_threshold_) return false;
+  if (!gates() || outcome.nis <= nis_threshold_) return false;
   if (!had_fix_) {
     had_fix_ = true;
     last_accepted_time_s_ = fix.time_s;

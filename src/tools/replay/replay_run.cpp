@@ -27,6 +27,7 @@ ReplayRun::ReplayRun(const ReplayOptions& options, const ReplaySettings& setting
                      const RecordingFacts& recording)
     : shell_(settings.localizer.shell),
       pipeline_(shell_.localization, settings.localizer.localizer->make()),
+      slew_(shell_.slew),
       sensor_frames_(shell_.frames, shell_.wants_antenna_from_tf()),
       bias_responder_(settings.gps_bias.bias.bias),
       has_truth_(recording.truths > 0) {
@@ -209,7 +210,7 @@ void ReplayRun::take(const LocalizationOutput& output) {
   write(topics::kEstimate, output.stamp, to_message(output, shell_.frames));
   write(topics::kFilteredFix, output.stamp, to_fix_message(output, *pipeline_.frame(), shell_.frames));
   tf2_msgs::TFMessage tf;
-  tf.transforms.push_back(to_map_to_odom(output, shell_.frames, shell_.transform_time_offset));
+  tf.transforms.push_back(to_map_to_odom(slew_.follow(output), output.stamp, shell_.frames, shell_.transform_time_offset));
   write(kTf, output.stamp, tf);
   if (occlusion_) occlusion_->add_estimate(output, tf.transforms.front());
 }

@@ -92,6 +92,7 @@ class ReplayRun {
   LocalizerNodeParameters shell_;
   LocalizationPipeline pipeline_;
   tf2::BufferCore tf_;
+  CorrectionSlew slew_;
   SensorFrames sensor_frames_;
   BiasResponder bias_responder_;
   std::optional<OcclusionStage> occlusion_;

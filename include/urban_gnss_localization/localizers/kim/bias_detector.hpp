@@ -1,7 +1,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <deque>
 
 #include "urban_gnss_localization/common/parameters.hpp"
 
@@ -11,8 +10,6 @@ struct BiasDetectorParameters {
   double gate_probability{0.99};
   double ramp_slack{0.5};
   double ramp_threshold{8.0};
-  int inert_window{30};
-  double inert_probability{1e-4};
 
   void visit(ParameterVisitor& v) {
     v("gate_probability", gate_probability, between(0.5, 0.999999), "",
@@ -22,9 +19,6 @@ struct BiasDetectorParameters {
     v("ramp_threshold", ramp_threshold, positive(), "sigma",
       "CUSUM of the innovations at which they are taken to drift; 8 with a ramp_slack of 0.5: one false alarm in 7800 "
       "fixes");
-    v("inert_window", inert_window, between(1, 10000), "", "number of fixes examined for the \"gate inert\" warning");
-    v("inert_probability", inert_probability, between(1e-9, 0.1), "",
-      "probability that a gate that works is reported as inert");
   }
 };
 
@@ -33,10 +27,9 @@ inline constexpr double kPrintedThreshold = 7.81;
 
 /// What the tests say of one innovation.
 struct BiasDetection {
-  double nis{0.0};       ///< normalised innovation squared, chi-squared with 2 degrees of freedom without a bias
-  bool is_jump{false};   ///< the NIS is above its quantile
-  bool is_ramp{false};   ///< the innovations have drifted in one direction
-  bool is_inert{false};  ///< the NIS runs so far below its expectation that the test cannot find anything
+  double nis{0.0};      ///< normalised innovation squared, chi-squared with 2 degrees of freedom without a bias
+  bool is_jump{false};  ///< the NIS is above its quantile
+  bool is_ramp{false};  ///< the innovations have drifted in one direction
   bool is_biased() const { return is_jump || is_ramp; }
 };
 
@@ -63,9 +56,7 @@ class BiasDetector {
  private:
   BiasDetectorParameters parameters_;
   double threshold_;
-  double inert_threshold_;
   Eigen::Vector4d sums_{Eigen::Vector4d::Zero()};
-  std::deque<double> recent_nis_;
 };
 
 /// NIS of an innovation: its squared Mahalanobis length. Covariance positive definite.

@@ -41,6 +41,7 @@ class ComplementaryEkf : public Localizer {
   std::string mode() const override { return enum_name(parameters_.mode); }
   bool is_as_printed() const override { return urban_gnss::is_as_printed(parameters_.mode); }
   bool wants_bias() const override { return false; }
+  bool gates() const override { return !is_as_printed() && parameters_.mode != ComplementaryMode::kStandard; }
   bool estimates_bias() const override { return true; }
   void initialize(const PoseEstimate& start) override;
   void move(const Twist2& twist, double duration_s) override;
@@ -64,8 +65,6 @@ class ComplementaryEkf : public Localizer {
   bool is_bias_open() const { return is_open_; }
   Eigen::Vector2d bias() const { return filter_.bias(); }
   Eigen::Matrix2d bias_covariance() const { return filter_.bias_covariance(); }
-  /// Whether the gate cannot find anything, as the NIS runs far below its expectation.
-  bool is_gate_inert() const { return is_inert_; }
   /// smallest_detectable_jump (m) at the last fix; 0 before the first.
   double smallest_detectable_jump_m() const;
 
@@ -140,7 +139,6 @@ class ComplementaryEkf : public Localizer {
   Reacquisition reacquisition_;
   double common_variance_m2_{0.0};  ///< per axis, of the error that all fixes share
   int insignificant_{0};
-  bool is_inert_{false};
   std::optional<Run> run_;
   std::optional<HeadingInitializer> heading_search_;  ///< while the heading is unknown
   Travel since_fix_;                                  ///< of odometry

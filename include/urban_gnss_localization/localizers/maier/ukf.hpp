@@ -111,6 +111,7 @@ class Ukf : public Localizer {
   }
   bool is_as_printed() const override { return parameters_.mode == UkfMode::kAsPrinted; }
   bool wants_bias() const override { return false; }
+  bool gates() const override { return !is_as_printed() && parameters_.outliers != OutlierPolicy::kNone; }
   /// Throws std::invalid_argument where pose or covariance is not finite. A covariance that is not positive definite is
   /// replaced by one close to it.
   void initialize(const PoseEstimate& start) override;

@@ -86,6 +86,9 @@ class ParticleFilter : public ParticleLocalizer {
   bool is_as_printed() const override { return parameters_.is_as_printed(); }
   ParticleFilterMode filter_mode() const { return parameters_.mode; }
   bool wants_bias() const override { return parameters_.mode != ParticleFilterMode::kConventional; }
+  bool gates() const override {
+    return !wants_bias() && !parameters_.is_as_printed() && parameters_.gate_probability < 1.0;
+  }
   void initialize(const PoseEstimate& start) override;
   void move(const Twist2& twist, double duration_s) override;
   void doubt(const MotionDoubt& doubt) override;
