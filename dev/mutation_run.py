@@ -40,13 +40,11 @@ class Mutation:
             raise ValueError("{}: unknown keys {}, tests {}".format(line, sorted(unknown), kinds))
         self.line, self.kind, self.test = line, kinds[0], entry[kinds[0]]
         self.what, self.file, self.text, self.mutant = (entry[key] for key in ("what", "file", "text", "mutant"))
-        self.build = entry.get("build", "")  # a make target that a Python test needs
+        self.build = entry.get("build", "all" if self.kind == "rostest" else "").split()
 
-    def target(self):
-        """What make has to build; empty where nothing."""
-        if self.kind == "gtest":
-            return self.test.split()[0] + "_tests"
-        return "all" if self.kind == "rostest" else self.build
+    def targets(self):
+        """What make has to build."""
+        return [self.test.split()[0] + "_tests"] if self.kind == "gtest" else self.build
 
 
 def read_mutations(root):
@@ -56,10 +54,14 @@ def read_mutations(root):
 
 
 def files_of(root):
-    """What belongs to the tree: all that git does not ignore."""
-    listed = subprocess.check_output(["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"], cwd=root)
-    names = sorted(set(listed.decode().split("\0")) - {""})
-    return [name for name in names if os.path.isfile(os.path.join(root, name))]
+    """What belongs to the tree: all but what was built or computed."""
+    names = set()
+    for folder, folders, files in os.walk(root):
+        folders[:] = [each for each in folders if each not in (".git", ".workspace", "__pycache__")]
+        if folder == root and "results" in folders:
+            folders.remove("results")
+        names.update(os.path.relpath(os.path.join(folder, file), root) for file in files)
+    return names
 
 
 def copy_tree(root, copy):
@@ -71,12 +73,8 @@ def copy_tree(root, copy):
             continue
         os.makedirs(os.path.dirname(target), exist_ok=True)
         shutil.copy(source, target)
-    for folder, folders, files in os.walk(copy):
-        folders[:] = [each for each in folders if each != ".workspace"]
-        for file in files:
-            name = os.path.relpath(os.path.join(folder, file), copy)
-            if name not in names:
-                os.remove(os.path.join(copy, name))
+    for name in files_of(copy) - names:
+        os.remove(os.path.join(copy, name))
 
 
 class Copy:
@@ -115,12 +113,12 @@ class Copy:
         if code != 0:
             sys.exit(output)
 
-    def make(self, target):
-        """Whether it was built; and the compiler's output."""
-        if not target:
+    def make(self, targets):
+        """Whether they were built; and the compiler's output."""
+        if not targets:
             return True, ""
         while True:  # the first build may take longer than a test may
-            code, output = self.run(["make", "-C", self.build_folder, "-j" + str(self.jobs), target])
+            code, output = self.run(["make", "-C", self.build_folder, "-j" + str(self.jobs)] + targets)
             if code is not None:
                 return code == 0, output
 
@@ -166,7 +164,7 @@ def judge(copy, mutation, passed_before, logs):
     log = open(os.path.join(logs, "{}_{}.log".format(mutation.line, os.path.basename(mutation.file))), "a")
     with log:
         if (mutation.kind, mutation.test) not in passed_before:
-            is_built, output = copy.make(mutation.target())
+            is_built, output = copy.make(mutation.targets())
             log.write(output)
             if is_built:
                 is_built, output = copy.test(mutation)
@@ -176,7 +174,7 @@ def judge(copy, mutation, passed_before, logs):
             passed_before.add((mutation.kind, mutation.test))
         with Change(copy, mutation):
             log.write("==== {} ====\n".format(mutation.mutant))
-            is_built, output = copy.make(mutation.target())
+            is_built, output = copy.make(mutation.targets())
             log.write(output)
             if not is_built:
                 return NO_BUILD

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
-#include <cmath>
+#include <initializer_list>
+#include <limits>
 
 #include "urban_gnss_localization/ros/conversions.hpp"
 #include "urban_gnss_localization/ros/visibility_messages.hpp"
@@ -23,10 +24,11 @@ TEST(Conversions, AFixOfABetterStatusIsNotTrustedMore) {
     return validate_fix(to_raw_fix(message), frame, std::nullopt, {});
   };
   const ValidatedFix plain = validated(sensor_msgs::NavSatStatus::STATUS_FIX);
-  for (const auto status : {sensor_msgs::NavSatStatus::STATUS_SBAS_FIX, sensor_msgs::NavSatStatus::STATUS_GBAS_FIX}) {
+  using Status = sensor_msgs::NavSatStatus;
+  for (const int status : std::initializer_list<int>{Status::STATUS_SBAS_FIX, Status::STATUS_GBAS_FIX}) {
     const ValidatedFix better = validated(static_cast<std::int8_t>(status));
-    EXPECT_EQ(better.fix.covariance, plain.fix.covariance) << int(status);
-    EXPECT_EQ(better.outcome.decision, plain.outcome.decision) << int(status);
+    EXPECT_EQ(better.fix.covariance, plain.fix.covariance) << status;
+    EXPECT_EQ(better.outcome.decision, plain.outcome.decision) << status;
   }
   EXPECT_TRUE(is_rejected(validated(sensor_msgs::NavSatStatus::STATUS_NO_FIX).outcome.decision));
 }
@@ -34,8 +36,9 @@ TEST(Conversions, AFixOfABetterStatusIsNotTrustedMore) {
 // Drivers fill in `used` from other epochs, or not at all (gps_umd#100).
 TEST(Conversions, WhatADriverSaysOfUsedSatellitesIsNotReliedOn) {
   msgs::SatelliteArray message;
-  for (const auto used : {msgs::Satellite::USED, msgs::Satellite::NOT_USED, msgs::Satellite::USE_UNKNOWN}) {
-    msgs::Satellite satellite;
+  using Satellite = msgs::Satellite;
+  for (const int used : std::initializer_list<int>{Satellite::USED, Satellite::NOT_USED, Satellite::USE_UNKNOWN}) {
+    Satellite satellite;
     satellite.svid = 7;
     satellite.azimuth = 1.0F;
     satellite.elevation = 0.5F;
@@ -85,7 +88,7 @@ TEST(Conversions, ADecisionIsPublishedWithItsEvidence) {
   outcome.reason = "far away";
   const msgs::FixDecision message = to_message(outcome);
   EXPECT_EQ(message.stamp, ros::Time(12.5));
-  EXPECT_EQ(message.decision, msgs::FixDecision::REJECTED_GATE);
+  EXPECT_EQ(message.decision, int(msgs::FixDecision::REJECTED_GATE));
   EXPECT_EQ(message.nis, 14.0);
   EXPECT_EQ(message.nis_threshold, 9.21);
   EXPECT_EQ(message.nis_dof, 2);
@@ -100,8 +103,9 @@ TEST(VisibilityMarkers, ShowRaysInTheirColoursAndTheNumberOfSatellites) {
   msgs::Visibility visibility;
   visibility.satellites_used = 2;
   visibility.satellites_visible = 1;
-  for (const auto each : {msgs::SatelliteVisibility::FREE, msgs::SatelliteVisibility::BLOCKED}) {
-    msgs::SatelliteVisibility satellite;
+  using Satellite = msgs::SatelliteVisibility;
+  for (const int each : std::initializer_list<int>{Satellite::FREE, Satellite::BLOCKED}) {
+    Satellite satellite;
     satellite.visibility = static_cast<std::uint8_t>(each);
     satellite.elevation = 0.5F;
     satellite.range = std::numeric_limits<float>::infinity();

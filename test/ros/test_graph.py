@@ -7,13 +7,11 @@ import subprocess
 import sys
 import tempfile
 import threading
-import time
 import unittest
 
 import rosbag
 import rospy
 import rostest
-from geometry_msgs.msg import PoseWithCovarianceStamped
 from sensor_msgs.msg import NavSatFix, NavSatStatus
 from std_srvs.srv import Empty
 from urban_gnss_localization.msg import FixDecision, GpsBias
@@ -150,24 +148,6 @@ class GraphTest(unittest.TestCase):
             self.assertAlmostEqual(radius, drive.RADIUS, delta=20.0)  # without noise in it, it lags behind
         mine = [m.radius for m in self.graph.biases if m.header.stamp.to_nsec() in radii]
         self.assertLess(max(mine), 15.0)
-
-    def test_initialpose_starts_anew(self):
-        """rviz's 2D Pose Estimate: the next estimate is there, and not before."""
-        outputs = self.graph.feed(self.drive.messages[:400])
-        told = PoseWithCovarianceStamped()
-        told.header.frame_id = "map"
-        told.pose.pose.position.x = outputs[-1].pose.pose.position.x + 40.0
-        told.pose.pose.position.y = outputs[-1].pose.pose.position.y
-        told.pose.pose.orientation = outputs[-1].pose.pose.orientation
-        told.pose.covariance = [0.25 if i % 7 == 0 else 0.0 for i in range(36)]
-        publisher = rospy.Publisher("initialpose", PoseWithCovarianceStamped, queue_size=1)
-        deadline = time.time() + 10.0
-        while publisher.get_num_connections() == 0 and time.time() < deadline:
-            time.sleep(0.05)
-        publisher.publish(told)
-        time.sleep(1.0)
-        after = self.graph.feed([each for each in self.drive.messages[400:] if each[0] == "odom"][:3])
-        self.assertLess(abs(after[0].pose.pose.position.x - told.pose.pose.position.x), 5.0)
 
     def test_services(self):
         """toLL and fromLL are inverse; set_pose moves the estimate, and refuses another frame."""

@@ -9,7 +9,7 @@
 namespace urban_gnss {
 
 /// Notices that a stream comes at another rate than before, by its stamps: the rate of a second source adds to that of
-/// the first. A stream with gaps, of less than a quarter of its messages, keeps its rate.
+/// the first. A stream with some gaps keeps its rate.
 class RateMonitor {
  public:
   /// Takes the stamp of the next message, newer than the last. Returns "2 Hz, 1 Hz before" where the rate is another
