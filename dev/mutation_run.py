@@ -3,7 +3,7 @@
 
     dev/mutation_run.py                    # all of dev/mutations.yaml, some minutes each dozen
     dev/mutation_run.py --only F7 F12      # these lines
-    dev/mutation_run.py --write            # and the table of results into docs/requirements.md
+    dev/mutation_run.py --write            # and the results into docs/requirements.md
 
 Works on a copy of the tree in .workspace/mutations, with a build of its own; the first build takes as long as that of
 scripts/setup.sh. Each test must pass before anything is changed. Exit code 1 where a mutation survives, does not
@@ -191,19 +191,24 @@ def row(mutation, result):
 HEADER = "| | switched off | test that must fail | |\n|---|---|---|---|"
 
 
-def write_results(root, rows):
-    """Puts the table at the end of the page, in place of the one before."""
+def write_results(root, mutations, results):
+    """Puts the table at the end of the page. A mutation without a result keeps the row that it has there."""
     path = os.path.join(root, PAGE)
     with open(path, encoding="utf-8") as file:
-        text = file.read()
+        text, _, before = file.read().partition(BEGIN)
+    rows = []
+    for mutation in mutations:
+        result = results.get(mutation)
+        known = [line for line in before.splitlines() if line.startswith(row(mutation, "").rstrip(" |"))]
+        rows += [row(mutation, result)] if result else known[:1]
     with open(path, "w", encoding="utf-8") as file:
-        file.write(text[:text.index(BEGIN)] + "\n".join([BEGIN, "", HEADER] + rows) + "\n")
+        file.write(text + "\n".join([BEGIN, "", HEADER] + rows) + "\n")
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--only", nargs="+", metavar="F7", help="lines of the requirements; default: all")
-    parser.add_argument("--write", action="store_true", help="write the table into " + PAGE + "; of all lines only")
+    parser.add_argument("--write", action="store_true", help="write the results into " + PAGE)
     parser.add_argument("--jobs", type=int, default=2, help="of make (default: 2)")
     parser.add_argument("--timeout", type=float, default=600.0, help="s, of a test (default: 600)")
     arguments = parser.parse_args()
@@ -212,8 +217,6 @@ def main():
     for line in arguments.only or []:
         if line not in lines:
             parser.error("no mutation of " + line)
-    if arguments.write and arguments.only:
-        parser.error("--write needs all lines")
     folder = os.path.join(ROOT, ".workspace", "mutations")
     logs = os.path.join(folder, ".workspace", "logs")
     shutil.rmtree(logs, ignore_errors=True)
@@ -222,19 +225,18 @@ def main():
     copy = Copy(folder, arguments.jobs, arguments.timeout)
     copy.configure()
     print(HEADER, flush=True)
-    passed_before, rows, failed = set(), [], 0
+    passed_before, results = set(), {}
     for mutation in mutations:
         if arguments.only and mutation.line not in arguments.only:
             continue
         since = time.time()
-        result = judge(copy, mutation, passed_before, logs)
-        rows.append(row(mutation, result))
-        failed += result != KILLED
-        print("{} {:.0f} s".format(rows[-1], time.time() - since), flush=True)
-    print("\n{} of {} mutations killed; logs in {}".format(len(rows) - failed, len(rows), os.path.relpath(logs)))
-    if arguments.write:
-        write_results(ROOT, rows)
-    return 1 if failed else 0
+        results[mutation] = judge(copy, mutation, passed_before, logs)
+        print("{} {:.0f} s".format(row(mutation, results[mutation]), time.time() - since), flush=True)
+        if arguments.write:
+            write_results(ROOT, mutations, results)
+    killed = list(results.values()).count(KILLED)
+    print("\n{} of {} mutations killed; logs in {}".format(killed, len(results), os.path.relpath(logs)))
+    return 0 if killed == len(results) else 1
 
 
 if __name__ == "__main__":

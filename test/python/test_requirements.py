@@ -73,12 +73,15 @@ class Mutations(unittest.TestCase):
             with self.subTest(line=each.line, test=each.test):
                 self.assertTrue(has_test(each))
 
-    def test_the_page_has_a_row_for_every_line_and_every_mutation(self):
-        promised, results = read_text(mutation_run.PAGE).split(mutation_run.BEGIN)
-        self.assertEqual(LINES, rows(promised))
-        wanted = [mutation_run.row(each, mutation_run.KILLED) for each in self.mutations]
-        written = [line for line in results.splitlines() if line.startswith("| F")]
-        self.assertEqual(wanted, written, "run dev/mutation_run.py --write")
+    def test_the_page_has_a_row_for_every_line(self):
+        self.assertEqual(LINES, rows(read_text(mutation_run.PAGE).split(mutation_run.BEGIN)[0]))
+
+    def test_every_result_is_that_of_a_mutation_and_none_survives(self):
+        results = read_text(mutation_run.PAGE).split(mutation_run.BEGIN)[1]
+        possible = [mutation_run.row(each, mutation_run.KILLED) for each in self.mutations]
+        for line in results.splitlines():
+            if line.startswith("| F"):
+                self.assertIn(line, possible, "run dev/mutation_run.py --write")
 
 
 class MutationRun(unittest.TestCase):
