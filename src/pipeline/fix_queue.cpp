@@ -31,12 +31,12 @@ std::vector<FixOutcome> FixQueue::validate(const LocalFrame& frame) {
       continue;
     }
     sanity_.note_far({});
+    if (outcome.covariance_clamped) note_clamped(outcome);
     if (!raw.reason.empty()) {
       if (outcome.decision == FixDecision::kAccepted) outcome.decision = FixDecision::kInflated;
       outcome.covariance_clamped = true;
       outcome.reason = raw.reason + (outcome.reason.empty() ? "" : "; ") + outcome.reason;
     }
-    if (outcome.covariance_clamped) note_clamped(outcome);
     last_stamp_ = raw.fix.stamp;
     push_bounded(validated_, std::move(fix));
   }

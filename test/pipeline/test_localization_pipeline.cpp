@@ -303,9 +303,9 @@ TEST(LocalizationPipeline, AnInertGateIsToldOnceAndSoIsItsEnd) {
   Rig rig(kGiven);
   rig.fake->gated = true;
   rig.fake->nis = 0.01;
-  rig.run(0.0, 29.0);
+  rig.run(0.0, 28.0);
   EXPECT_FALSE(has_event(rig.pipeline, PipelineEvent::Level::kWarn, "gate inert"));
-  rig.run(29.1, 40.0);
+  rig.run(28.1, 40.0);
   EXPECT_TRUE(has_event(rig.pipeline, PipelineEvent::Level::kWarn, "gate inert"));
   EXPECT_TRUE(rig.pipeline.report().is_gate_inert);
   rig.fake->nis = 20.0;

@@ -28,9 +28,17 @@ Pose2 odometry(int step) { return compose({0.0, 0.02 * step, 0.001 * step}, trut
 Eigen::Isometry3d base(const Pose2& pose) { return to_isometry(pose); }
 Eigen::Isometry3d sensor_in_base() { return Eigen::Isometry3d(Eigen::Translation3d(kSensor)); }
 
+PointCloud near_part(const PointCloud& cloud) {
+  PointCloud near;
+  for (const Eigen::Vector3f& point : cloud) {
+    if (std::abs(point.x()) < 45.0F && point.z() < 25.0F) near.push_back(point);
+  }
+  return near;
+}
+
 /// Houses, the ground and the robot's own roof; a hedge in every third scan, through which the others look.
 PointCloud scan(int step) {
-  static const PointCloud houses = sampled(street(), 1.0);
+  static const PointCloud houses = near_part(sampled(street(), 1.2));
   static const PointCloud hedge = sampled({wall({-30.0, -7.0}, {30.0, -7.0}, 0.0, 6.0)}, 0.6);
   static const PointCloud ground = sampled({{{-30.0, -8.0, 0.0}, {60.0, 0.0, 0.0}, {0.0, 16.0, 0.0}}}, 2.0);
   PointCloud cloud = houses;
@@ -139,7 +147,7 @@ TEST(OcclusionParameters, EachHasAnEffect) {
       {"doubtful_share", {none, "0.01"}},
       {"imu_heading", {none, "absolute"}},
       {"imu_heading_offset", {"imu_heading: absolute", "0.3"}},
-      {"imu_heading_sigma", {"imu_heading: absolute", "0.3"}},
+      {"imu_heading_sigma", {"{imu_heading: absolute, heading_timeout: 1.0}", "0.3"}},
   };
   std::vector<std::string> elsewhere = parameter_names(GnssCovarianceParameters{});  // GnssCovariance.Every...
   for (const std::string& name : parameter_names(KdTreeRayTracerParameters{})) {
@@ -154,7 +162,7 @@ TEST(OcclusionParameters, EachHasAnEffect) {
     }
     const auto& [set, value] = found->second;
     if (references[set].empty()) references[set] = trace(set, none);
-    EXPECT_NE(trace(set, name + ": " + value), references[set]) << name;
+    EXPECT_TRUE(trace(set, name + ": " + value) != references[set]) << name;
   }
 }
 
