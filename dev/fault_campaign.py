@@ -324,7 +324,7 @@ class Campaign:
             import fault_rigs
             rigs = fault_rigs.all_rigs()
             wanted = [rig for rig in rigs if not self.options.rigs or rig.name in self.options.rigs]
-            self.end = time.monotonic() + (self.options.seconds or 1e9)
+            self.seconds_left = self.options.seconds or 1e9
             self.left = self.options.cases
             for number, rig in enumerate(wanted):
                 self.run_rig(rospy, master, rig, len(wanted) - number)
@@ -332,12 +332,11 @@ class Campaign:
             master.close()
 
     def run_rig(self, rospy, master, rig, rigs_left):
-        begin = time.monotonic()
-        end = begin + (self.end - begin) / rigs_left
         most = -(-self.left // rigs_left)
         session = Session(rospy, master, rig, self.options.seed)
         try:
             session.start()
+            begin = time.monotonic()
             groups = self.groups_of(session)
             count = sum(map(len, groups))
             if self.options.list:
@@ -345,10 +344,11 @@ class Campaign:
                 return
             done = []
             for group in groups:
-                if time.monotonic() > end or len(done) >= most:
+                if time.monotonic() > begin + self.seconds_left / rigs_left or len(done) >= most:
                     break
                 self.several(session, group, done)
             self.left -= len(done)
+            self.seconds_left -= time.monotonic() - begin
             self.report("%s: %d of %d cases in %.0f s" % (rig.name, len(done), count, time.monotonic() - begin))
         finally:
             session.close()
@@ -451,7 +451,7 @@ def main():
     """Read the command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--cases", type=int, default=1000000, help="at most")
-    parser.add_argument("--seconds", type=float, help="end after this time")
+    parser.add_argument("--seconds", type=float, help="of cases, after which it ends; starts of nodes are not counted")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--only", default="", help='cases that have this in "NODE TOPIC TYPE CASE"')
     parser.add_argument("--rigs", nargs="+", default=[], help="of these nodes alone")
@@ -459,8 +459,10 @@ def main():
     options = parser.parse_args()
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(2))  # and no node is left behind
     work = Campaign(options, lambda text: print(text, flush=True))
-    work.run()
-    print(show(work.table))
+    try:
+        work.run()
+    finally:
+        print(show(work.table))
     sys.stdout.flush()
     os._exit(1 if work.faults else 0)  # threads of rospy that wait for a hung node do not end
 

@@ -261,9 +261,6 @@ class Rig:
         self.only = only                # kinds of cases, or all
 
 
-QUIET = {"expert/particle_count": 200, "expert/particle_cloud_rate": 1.0}
-
-
 def localizer(name, stream=RobotStream, parameters=None, others=(), only=None, rig=None):
     rig = rig or name
     nodes = [Node(name + "_node", "/%s/localizer" % rig, dict(parameters or {}, datum=list(drive.DATUM)))]
@@ -312,10 +309,10 @@ def all_rigs():
         occlusion("occlusion_sim_time", SimulatedStreet, clock),
         controller("controller_sim_time", SimulatedEstimates, clock),
         localizer("imm_ekf"),
-        localizer("particle_filter", parameters=QUIET,
+        localizer("particle_filter", parameters={"expert/particle_count": 200, "expert/particle_cloud_rate": 1.0},
                   others=[Node("gps_bias_node", "/particle_filter/gps_bias", {"localizer": "localizer"})]),
         occlusion("occlusion", StreetStream),
         localizer("complementary_ekf", PlainStream),
         localizer("ukf"),
-        localizer("switching_particle_filter", parameters=QUIET),
+        localizer("switching_particle_filter", parameters={"expert/particle_cloud_rate": 1.0}),
     ]
