@@ -1,4 +1,4 @@
-// The default localizer on a robot that stands, or whose odometry says so. With its default parameters.
+// The default localizer, with its default parameters, on a robot that stands.
 
 #include <gtest/gtest.h>
 
@@ -74,28 +74,6 @@ TEST(ImmEkfParked, PoseDoesNotCreepAndSigmaStaysHonest) {
   RecordProperty("creep_m", std::to_string(creep_m));
   EXPECT_LT(creep_m, 0.5) << "m in two minutes, where the fixes wander by some metres";
   EXPECT_LT(nees, 6.0) << "sigma is at most 1.7 times too small";
-}
-
-// An encoder that says 0 while the robot drives: the fixes move, and the estimate goes with them.
-TEST(ImmEkfParked, ADeadEncoderIsNoStandstill) {
-  constexpr double kSpeed_mps = 1.5;
-  Receiver receiver(1);
-  ImmEkf filter({}, {});
-  filter.initialize(pose_with_sigma({0.0, 0.0, 0.0}, 1.0, 0.05));
-  double time_s = 0.0;
-  for (int k = 0; k < 60; ++k) {
-    for (int step = 0; step < 10; ++step) filter.move({kSpeed_mps, 0.0}, 0.1);
-    time_s += 1.0;
-    filter.correct(receiver.fix({kSpeed_mps * time_s, 0.0}, time_s));
-  }
-  for (int k = 0; k < 240; ++k) {
-    for (int step = 0; step < 10; ++step) filter.move({0.0, 0.0}, 0.1);
-    time_s += 1.0;
-    filter.correct(receiver.fix({kSpeed_mps * time_s, 0.0}, time_s));
-  }
-  const double error_m = (filter.pose().position() - Eigen::Vector2d(kSpeed_mps * time_s, 0.0)).norm();
-  RecordProperty("error_m", std::to_string(error_m));
-  EXPECT_LT(error_m, 40.0) << "of 360 m that the encoder did not see";
 }
 
 }  // namespace
