@@ -20,7 +20,7 @@ from nav_msgs.msg import Odometry  # noqa: E402
 from sensor_msgs.msg import NavSatFix, PointCloud2  # noqa: E402
 from urban_gnss_localization.msg import LocalizationStatus, Visibility  # noqa: E402
 
-SECONDS = 40
+SECONDS = 30
 LEAST_CASES = 30  # in that time, also on a busy machine
 NODES = ("imm_ekf", "particle_filter", "occlusion")
 
