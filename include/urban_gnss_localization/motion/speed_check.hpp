@@ -29,8 +29,7 @@ struct SpeedPair {
 /// long as no reflection keeps that pattern: 1.5 s reversed, 4 s dead or scaled by 1.8 and more, 10 s scaled by less; a
 /// scale half as long where it began with a jump of the odometry. The receiver's speed, or its mean ratio to the
 /// odometry's, must be steady, and no robot turns back without a stop, unless it is the odometry whose sign changes. A
-/// fault ends once both agree for 1.5 s while the robot moves, by fixes for 6 s. A silence of
-/// 2.5 s begins anew.
+/// fault ends once both agree for 1.5 s while the robot moves, by fixes for 6 s. A silence of 2.5 s begins anew.
 class SpeedCheck {
  public:
   /// The fault as of this pair; stamps ascend.
