@@ -92,8 +92,8 @@ class CommandLine {
       check_outputs();
       work();
     } catch (const std::bad_alloc&) {
-      const std::string text = "not enough memory; the command was " + command_.substr(command_.find(program_));
-      std::cerr << program_ << ": " << text << inputs_.unless_named_in(text) << '\n';
+      std::cerr << program_ << ": not enough memory; the command was " << command_.substr(command_.find(program_))
+                << inputs_.unless_named_in("") << '\n';
       return 1;
     } catch (const std::exception& error) {
       std::cerr << program_ << ": " << error.what() << inputs_.unless_named_in(error.what()) << '\n';
