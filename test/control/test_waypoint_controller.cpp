@@ -139,7 +139,7 @@ TEST(WaypointController, EveryParameterHasAnEffect) {
     WaypointController controller(p);
     Pose2 pose;
     std::ostringstream out;
-    for (int k = 0; k < 3000; ++k) {
+    for (int k = 0; k < 12000; ++k) {
       const BicycleInput input = controller.steer(pose);
       out << input.speed_mps << ' ' << input.steering_rad << ' ' << controller.current_target() << '\n';
       pose = move(pose, {input.speed_mps, yaw_rate(input, p.wheelbase)}, 0.01);

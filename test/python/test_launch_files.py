@@ -41,8 +41,9 @@ class LaunchFilesTest(unittest.TestCase):
             self.assertIn("/occlusion/imm_ekf/expert/fix_delay: 0.25", said("occlusion.launch", "params:=mine.yaml"))
             for launch in ("localization.launch", "occlusion.launch"):
                 self.assertIn("file does not exist [{}/no.yaml]".format(folder), said(launch, "params:=no.yaml"))
-            self.assertIn("--bags {0}/a.bag {0}/b.bag /c.bag --topics".format(folder),
-                          said("replay.launch", "bag:=a.bag b.bag /c.bag", option="--args player"))
+            player = said("replay.launch", "bag:=a.bag b.bag /c.bag", option="--args player")
+            self.assertIn("env --chdir={} ".format(folder), player)
+            self.assertIn(" --bags a.bag b.bag /c.bag --topics ", player)
 
 
 if __name__ == "__main__":
