@@ -88,6 +88,29 @@ class StoredResults(unittest.TestCase):
             for pair in pairs:
                 self.assertIn(pair.format(between), text, page)
 
+    def test_maier_as_printed_beside_ours(self):
+        """Every row of both settings, the command, and the figures of the text."""
+        results = stored("occlusion_experiment")
+        self.assertIn(results["command"], self.commands)
+        self.assertEqual(results["seeds"], list(range(1, 11)))
+        tables = (occlusion_report.table_1, occlusion_report.table_2, occlusion_report.table_nees)
+        rows = [row for table in tables for row in occlusion_report.markdown(*table(results["scenarios"])).splitlines()]
+        self.assertGreater(len(rows), 20)
+        for row in rows:
+            self.assertIn(row, self.page)
+        loop = results["scenarios"]["campus_loop"]
+        found, errors = loop["classification"], loop["trajectory"]
+
+        def change(model, base, key):
+            return abs(100.0 * (errors[model][key] / errors[base][key] - 1.0))
+        text = " ".join(self.page.split())
+        self.assertIn("calls {:.0f} % of the fixes right".format(100.0 * found["paper"]["correct"]), text)
+        self.assertIn("{:.0f} % nearer to the truth, its heading {:.0f} %".format(
+            change("paper", "conventional", "position_mean_m"), change("paper", "conventional", "heading_mean_rad")), text)
+        self.assertIn("{:.0f} % in position, and the heading is {:.0f} % worse".format(
+            change("paper_as_printed", "conventional_as_printed", "position_mean_m"),
+            change("paper_as_printed", "conventional_as_printed", "heading_mean_rad")), text)
+
     def test_bag_with_lidar(self):
         """Every row of the tables of the bag, and the command."""
         results = stored("occlusion_bag")
