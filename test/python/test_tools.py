@@ -243,6 +243,8 @@ class ToolTest(unittest.TestCase):
         output = self.refuse("replay", self.path("in.bag"), "--datum", "91,0,0")
         self.assertTrue(output.startswith("replay: --datum: 1 bad parameter"), output)
         self.assertIn("must be sensor_msgs/NavSatFix", self.refuse("replay", self.path("in.bag"), "--fix-topic", "tf"))
+        self.assertIn("--fix-topic and --odom-topic are the same topic, odom",
+                      self.refuse("replay", self.path("in.bag"), "--fix-topic", "odom"))
 
     def test_a_localizer_is_one_line_of_the_registry(self):
         """A dummy that nothing but its own file and one line knows: named, told, run and compared like the others."""

@@ -45,7 +45,7 @@ std::size_t BagReader::count(const std::string& topic) const {
 std::string BagReader::topics() const {
   std::string text;
   for (const BagConnection& each : connections()) text += "\n  " + each.topic + " (" + each.type + ")";
-  return text;
+  return text.empty() ? " none at all" : text;
 }
 
 BagMessages::BagMessages(const BagReader& bag, std::vector<std::string> names) : names_(std::move(names)) {

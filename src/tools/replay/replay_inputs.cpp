@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <iostream>
+#include <map>
 #include <stdexcept>
 #include <utility>
 
@@ -98,7 +99,12 @@ void ReplayInputs::read_topics() {
 /// Throws std::runtime_error, which lists what the bag has, where a topic that is needed has no message.
 void ReplayInputs::require_topics() const {
   const bool has_receiver = driver_ || recording_;
+  std::map<std::string, std::string> option_of;
   const auto require = [&](bool is_needed, const std::string& option, const std::string& name) {
+    const auto [other, is_first] = option_of.emplace(name, option);
+    if (!is_first && !name.empty()) {
+      throw std::runtime_error(other->second + " and " + option + " are the same topic, " + name);
+    }
     if (!is_needed || bag_->count(name) > 0) return;
     throw std::runtime_error(bag_->name() + " has no message on " + name + " (" + option + "); it has" +
                              bag_->topics());
