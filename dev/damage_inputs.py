@@ -187,10 +187,12 @@ def write_nmea(folder):
     lines = []
     for k in range(40):
         time = "1200%02d.00" % k
-        lines.append(sentence("GPRMC,%s,A,4500.0000,N,00700.0000,E,6.0,90.0,290723,,,A" % time))
-        lines.append(sentence("GPGGA,%s,4500.0000,N,00700.0000,E,1,08,1.0,50.0,M,47.0,M,," % time))
+        place = "4500.%04d,N,00700.0000,E" % (k % 4)
+        lines.append(sentence("GPRMC,%s,A,%s,0.0,90.0,290723,,,A" % (time, place)))
+        lines.append(sentence("GPGGA,%s,%s,1,08,1.0,50.0,M,47.0,M,," % (time, place)))
         lines.append(sentence("GPGST,%s,5.0,3.0,2.0,45.0,2.5,2.5,5.0" % time))
-        lines.append(sentence("GPGSV,1,1,03,01,40,083,46,02,17,308,41,12,07,344,39"))
+        lines.append(sentence("GPGSV,2,1,06,01,40,083,46,02,17,308,41,12,07,344,39,14,65,120,47"))
+        lines.append(sentence("GPGSV,2,2,06,22,30,210,44,25,50,270,45"))
     write_text(folder, "log.nmea", "".join(lines))
 
 
@@ -218,6 +220,7 @@ def write_all(folder):
         Case("nmea", "log.nmea", ["replay", "--nmea", "{}/log.nmea", "--odom", "none", "--tum", "OUT/o.tum", "--json",
                                   "OUT/o.json"]),
         Case("nmea, decode", "log.nmea", ["decode_nmea", "{}/log.nmea"]),
+        Case("nmea, calibrate", "log.nmea", ["calibrate_ure", "--nmea", "{}/log.nmea"]),
         Case("meta.json", "meta.json", ["csv_to_bag", "{}", "OUT/o.bag"])]
     cases += [Case("csv " + name, name + ".csv", ["csv_to_bag", "{}", "OUT/o.bag"])
               for name in ("odom", "gnss", "sats", "imu", "truth")]

@@ -13,6 +13,9 @@
 namespace urban_gnss {
 namespace {
 
+/// Of the ranges of a receiver without carrier phases it is never so small.
+constexpr double kLeastSigma_m = 0.01;
+
 constexpr std::size_t kFewestFixes = 30;
 
 /// A fix of a good geometry.
@@ -153,6 +156,10 @@ UreCalibration calibrate_ure(const std::vector<StationaryFix>& fixes, const UreC
   const double freedom = settings.place ? 1.0 : 1.0 - 1.0 / std::max(2.0, found.independent_errors);
   found.sigma_m = std::sqrt(squares / (2.0 * count * freedom));
   found.relative_error = 0.5 / std::sqrt(found.independent_errors);
+  if (found.sigma_m < kLeastSigma_m) {
+    throw std::runtime_error(
+        "the fixes hardly scatter, as where a receiver holds its place while it stands: turn its \"static hold\" off");
+  }
   return found;
 }
 

@@ -66,13 +66,17 @@ Recording read(const ReplayOptions& options) {
   const ReceiverRecording all = read_receiver(options);
   Recording recording;
   recording.source = all.source;
+  if (all.outputs.empty()) throw std::runtime_error(all.source + ": no fix, no velocity and no satellites");
   const Stamp first = all.outputs.front().time;
   for (const TimedOutput& each : all.outputs) {
     const double into_s = to_seconds(each.time - first);
     if (into_s < options.start_s || into_s > options.start_s + options.duration_s) continue;
     const ReceiverOutput& output = each.output;
     for (const RawFix& fix : output.fixes) {
-      if (is_usable_position(fix)) recording.fixes.push_back(fix);
+      if (!is_usable_position(fix)) continue;
+      recording.fixes.push_back(fix);
+      if (!is_altitude(fix.position.altitude_m))
+        recording.fixes.back().position.altitude_m = 0.0;  // plane errors alone
     }
     recording.velocities.insert(recording.velocities.end(), output.velocities.begin(), output.velocities.end());
     for (const SatelliteEpoch& epoch : output.satellites) recording.satellites[epoch.stamp] = epoch.satellites;

@@ -87,6 +87,7 @@ TEST(UreCalibration, SaysWhatIsMissing) {
   EXPECT_NE(refusal({}).find("no fix"), std::string::npos);
   auto fixes = recording(1.0, 20, 0.0, 1.0, 1);
   EXPECT_NE(refusal(fixes).find("20 of 20 fixes can be used, at least 30"), std::string::npos) << refusal(fixes);
+  EXPECT_NE(refusal(recording(1e-4, 300, 0.0, 1.0, 1)).find("static hold"), std::string::npos);
   for (StationaryFix& fix : fixes) fix.satellites.resize(3);
   EXPECT_NE(refusal(fixes).find("directions of at least 4 satellites"), std::string::npos) << refusal(fixes);
   UreCalibrationSettings strict;

@@ -2,6 +2,8 @@
 
 URBAN_GNSS_PROGRAMS names the folder of the programs. Real recordings are taken from URBAN_GNSS_DATA; without it those
 tests are skipped."""
+import functools
+import operator
 import os
 import re
 import subprocess
@@ -91,6 +93,23 @@ class CalibrateUreTest(unittest.TestCase):
     def test_too_few_fixes_are_refused(self):
         self.assertIn("at least 30 are needed", self.refuse(self.standing, "--duration", "4"))
         self.assertIn("an HDOP above", self.refuse(self.standing, "--max-hdop", "0.2"))
+
+    def log_of(self, *sentences):
+        """A file of NMEA sentences, each with its checksum."""
+        path = os.path.join(self.scratch.name, "receiver.nmea")
+        with open(path, "w") as file:
+            for sentence in sentences:
+                file.write("${}*{:02X}\r\n".format(sentence, functools.reduce(operator.xor, sentence.encode())))
+        return path
+
+    def test_a_log_that_says_nothing_of_the_receiver_is_refused(self):
+        log = self.log_of(*["GPTXT,01,01,02,ANTSTATUS=OK"] * 20)
+        self.assertIn("no fix", self.refuse("--nmea", log))
+
+    def test_fixes_without_an_altitude_are_fixes(self):
+        log = self.log_of(*["GPRMC,1200{:02d}.00,A,4807.038,N,01131.000,E,0.0,0.0,230320,,,A".format(second)
+                            for second in range(50)])
+        self.assertIn("satellites", self.refuse("--nmea", log))
 
     @unittest.skipUnless(os.path.isdir(STATIC), "no recording " + STATIC)
     def test_a_recorded_receiver(self):

@@ -46,7 +46,7 @@ struct UreCalibration {
 /// satellites with a residual where there are residuals, else of all that are tracked. Residuals r of an epoch give
 /// sigma^2 = sum r^2 / (their number - 3 - clocks).
 ///
-/// Throws std::runtime_error, which says what is missing: satellites, a good geometry, or at least 30 fixes.
+/// Throws std::runtime_error, which says what is missing: satellites, a good geometry, at least 30 fixes, or a scatter.
 UreCalibration calibrate_ure(const std::vector<StationaryFix>& fixes, const UreCalibrationSettings& settings);
 
 }  // namespace urban_gnss
