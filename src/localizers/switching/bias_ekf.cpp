@@ -39,16 +39,19 @@ void predict(BiasGaussian& state, const MotionStep& motion, const OdometryErrorP
   const DeadReckoningStep step =
       dead_reckon(state.pose(), {state.mean[kSpeedScale], state.mean[4], state.mean[kYawRateScale]}, motion, p);
   state.mean.head<3>() << step.pose.x, step.pose.y, step.pose.yaw;
-  Eigen::Matrix<double, kMotionStates, kMotionStates> transition;
-  transition.setIdentity();
-  transition.topLeftCorner<kErrorStates, kErrorStates>() = step.transition;
-  transition.block<3, 1>(0, kYawRateScale) = step.yaw_rate_scale;
-  auto odometry = state.covariance.topLeftCorner<kMotionStates, kMotionStates>();
-  odometry = (transition * odometry * transition.transpose()).eval();
-  odometry.topLeftCorner<kErrorStates, kErrorStates>() += step.noise;
-  auto with_bias = state.covariance.topRightCorner<kMotionStates, 2>();
-  with_bias = (transition * with_bias).eval();
-  state.covariance.bottomLeftCorner<2, kMotionStates>() = with_bias.transpose();
+  // The transition is I + A, where A is 0 but for three rows, of the pose, and for these columns: P + A P + P A' + A P
+  // A'.
+  constexpr int kFrom = kYaw;
+  constexpr int kColumns = kMotionStates - kFrom;
+  Eigen::Matrix<double, 3, kColumns> a;
+  a << step.transition.topRightCorner<3, kErrorStates - kFrom>(), step.yaw_rate_scale;
+  a(kYaw, kYaw - kFrom) -= 1.0;
+  const Eigen::Matrix<double, 3, kBiasStates> ap = a * state.covariance.middleRows<kColumns>(kFrom);
+  const Eigen::Matrix3d apa = ap.middleCols<kColumns>(kFrom) * a.transpose();
+  state.covariance.topRows<3>() += ap;
+  state.covariance.leftCols<3>() += ap.transpose();
+  state.covariance.topLeftCorner<3, 3>() += apa;
+  state.covariance.topLeftCorner<kErrorStates, kErrorStates>() += step.noise;
 }
 
 void doubt(BiasGaussian& state, const MotionDoubt& doubt) {

@@ -66,18 +66,30 @@ ImmEkf::Branches ImmEkf::branch(const FixMeasurement& fix) const {
   branches.expected_quality = quality.transpose() * quality_probabilities();
   double largest = -std::numeric_limits<double>::infinity();
   bool is_finite = true;
-  for (std::size_t j = 0; j < kContinuations; ++j) {
-    std::array<Gaussian, kFilters> parts = filters_;
-    for (std::size_t i = 0; i < kFilters; ++i) {
-      continue_bias(parts[i], kModes[i % kLastingModes], kModes[j], elapsed_s, parameters_.modes);
+  for (std::size_t level = 0; level < kQualityLevels; ++level) {
+    // First the qualities, of each mode for itself: how a bias goes on from there does not depend on them.
+    std::array<Gaussian, kLastingModes> modes;
+    std::array<double, kLastingModes> before{};
+    for (std::size_t m = 0; m < kLastingModes; ++m) {
+      std::array<double, kQualityLevels> weights{};
+      for (std::size_t from = 0; from < kQualityLevels; ++from) {
+        before[m] += weights[from] =
+            probability_[from * kLastingModes + m] * quality(static_cast<int>(from), static_cast<int>(level));
+      }
+      modes[m] = filters_[level * kLastingModes + m];
+      if (before[m] > 0.0) {
+        modes[m] = match_moments(
+            kQualityLevels, [&](std::size_t from) -> const Gaussian& { return filters_[from * kLastingModes + m]; },
+            [&](std::size_t from) { return weights[from] / before[m]; });
+      }
     }
-    for (std::size_t level = 0; level < kQualityLevels; ++level) {
-      std::array<double, kFilters> weights{};
+    for (std::size_t j = 0; j < kContinuations; ++j) {
+      std::array<Gaussian, kLastingModes> parts = modes;
+      std::array<double, kLastingModes> weights{};
       double sum = 0.0;
-      for (std::size_t i = 0; i < kFilters; ++i) {
-        weights[i] = probability_[i] * transition(static_cast<int>(i % kLastingModes), static_cast<int>(j)) *
-                     quality(static_cast<int>(i / kLastingModes), static_cast<int>(level));
-        sum += weights[i];
+      for (std::size_t m = 0; m < kLastingModes; ++m) {
+        continue_bias(parts[m], kModes[m], kModes[j], elapsed_s, parameters_.modes);
+        sum += weights[m] = before[m] * transition(static_cast<int>(m), static_cast<int>(j));
       }
       const std::size_t branch = level * kContinuations + j;
       Gaussian& filter = branches.filters[branch];
@@ -85,7 +97,7 @@ ImmEkf::Branches ImmEkf::branch(const FixMeasurement& fix) const {
         for (double& weight : weights) weight /= sum;
         filter = mixture_of(parts, weights);
       } else {
-        filter = parts[level * kLastingModes];
+        filter = parts[0];
       }
       branches.updates[branch] = take_fix(filter, kModes[j], fix, noise, parameters_);
       is_finite = is_finite && filter.is_finite();
@@ -212,7 +224,12 @@ QualityProbabilities ImmEkf::quality_probabilities() const {
   return sums;
 }
 
-Pose2 ImmEkf::pose() const { return mixture().pose(); }
+Pose2 ImmEkf::pose() const {
+  const BiasEkfState mean = match_means(
+      kFilters, [&](std::size_t i) -> const Gaussian& { return filters_[i]; },
+      [&](std::size_t i) { return probability_[i]; });
+  return {mean[0], mean[1], mean[kYaw]};
+}
 
 PoseEstimate ImmEkf::estimate() const {
   const Gaussian all = mixture();

@@ -86,25 +86,32 @@ BiasGaussian start_gaussian(const PoseEstimate& start, const SwitchingModelParam
 /// The difference of two states, the yaw's on the circle.
 BiasEkfState difference(const BiasEkfState& a, const BiasEkfState& b);
 
-/// Mean and covariance of a mixture of `count` >= 1 Gaussians: state_of(i) with weight_of(i), which sum to 1. Yaws are
-/// averaged as differences from the heaviest.
+/// Mean of a mixture of `count` >= 1 Gaussians: state_of(i) with weight_of(i), which sum to 1. Yaws are averaged as
+/// differences from the heaviest.
 template <class StateOf, class WeightOf>
-BiasGaussian match_moments(std::size_t count, const StateOf& state_of, const WeightOf& weight_of) {
+BiasEkfState match_means(std::size_t count, const StateOf& state_of, const WeightOf& weight_of) {
   std::size_t heaviest = 0;
   for (std::size_t i = 1; i < count; ++i) {
     if (weight_of(i) > weight_of(heaviest)) heaviest = i;
   }
   const BiasEkfState centre = state_of(heaviest).mean;
-  BiasEkfState mean = BiasEkfState::Zero();
-  for (std::size_t i = 0; i < count; ++i) mean += weight_of(i) * difference(state_of(i).mean, centre);
+  BiasEkfState apart = BiasEkfState::Zero();
+  for (std::size_t i = 0; i < count; ++i) apart += weight_of(i) * difference(state_of(i).mean, centre);
+  BiasEkfState mean = centre + apart;
+  mean[2] = wrap_angle(mean[2]);
+  return mean;
+}
+
+/// Mean and covariance of the same.
+template <class StateOf, class WeightOf>
+BiasGaussian match_moments(std::size_t count, const StateOf& state_of, const WeightOf& weight_of) {
   BiasGaussian whole;
+  whole.mean = match_means(count, state_of, weight_of);
   for (std::size_t i = 0; i < count; ++i) {
     if (weight_of(i) <= 0.0) continue;
-    const BiasEkfState spread = difference(state_of(i).mean, centre) - mean;
+    const BiasEkfState spread = difference(state_of(i).mean, whole.mean);
     whole.covariance += weight_of(i) * (state_of(i).covariance + spread * spread.transpose());
   }
-  whole.mean = centre + mean;
-  whole.mean[2] = wrap_angle(whole.mean[2]);
   return whole;
 }
 
