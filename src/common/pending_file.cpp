@@ -99,8 +99,13 @@ PendingFile::PendingFile(const fs::path& target) : target_(target), resolved_(re
   is_direct_ = exists && !S_ISREG(status.st_mode);
   pending_ = is_direct_ ? resolved_ : beside(resolved_);
   if (is_direct_) return;
-  create(pending_, target_, exists ? &status : nullptr);
-  remember(pending_);
+  remember(pending_);  // first, for a signal may come as soon as it exists
+  try {
+    create(pending_, target_, exists ? &status : nullptr);
+  } catch (const std::runtime_error&) {
+    forget(pending_);
+    throw;
+  }
 }
 
 PendingFile::~PendingFile() {

@@ -56,6 +56,25 @@ class SimulateTest(unittest.TestCase):
     def of(self, name, topic):
         return [message for _, message, _ in self.messages(name, topic)]
 
+    def test_the_bag_is_whole_for_rosbag(self):
+        """Its index finds what its chunks hold, of any topic and time; rosbag writes the same messages out of it."""
+        self.succeed("--scenario", "open_sky", "--duration", "20", "--without-lidar", "--output", self.path("drive.bag"))
+        with rosbag.Bag(self.path("drive.bag")) as bag:
+            everything = [(topic, data[1], time) for topic, data, time in bag.read_messages(raw=True)]
+            self.assertGreater(len(bag._chunks), 1)
+            self.assertEqual(bag.get_message_count(), len(everything))
+            times = [time for _, _, time in everything]
+            self.assertEqual((bag.get_start_time(), bag.get_end_time()), (min(times).to_sec(), max(times).to_sec()))
+            middle = times[len(times) // 2]
+            found = [(topic, time) for topic, _, time in bag.read_messages(["/gps/fix", "/tf"], start_time=middle)]
+            self.assertEqual(found, [(topic, time) for topic, _, time in everything
+                                     if topic in ("/gps/fix", "/tf") and time >= middle])
+            with rosbag.Bag(self.path("copy.bag"), "w") as copy:
+                for topic, message, time in bag.read_messages(raw=True):
+                    copy.write(topic, message, time, raw=True)
+        with rosbag.Bag(self.path("copy.bag")) as copy:
+            self.assertEqual([(topic, data[1], time) for topic, data, time in copy.read_messages(raw=True)], everything)
+
     def test_same_scenario_and_seed_give_the_same_bag(self):
         def simulate(name, *arguments):
             self.succeed("--scenario", "downtown_grid", "--duration", 3, *SMALL_LIDAR, "--output", self.path(name),

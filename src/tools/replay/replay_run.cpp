@@ -195,6 +195,7 @@ void ReplayRun::settle() {
     ++decisions_[decision];
     if (is_rejected(outcome.decision)) rejections_.add(decision + ": " + outcome.reason);
   }
+  if (!bag_) return;
   for (const auto& status : to_status_messages(pipeline_, outcomes, to_ros(newest_), shell_.frames.map)) {
     write(topics::kStatus, newest_, status);
   }
@@ -207,6 +208,7 @@ void ReplayRun::take(const LocalizationOutput& output) {
   if (!first_heading_ && std::sqrt(pose.covariance(2, 2)) < kKnownHeading_rad) first_heading_ = output.stamp;
   if (has_truth_) estimate_.push_back(pose);
   if (tum_) write_tum(tum_->stream(), {pose});
+  if (!bag_ && !occlusion_) return;
   write(topics::kEstimate, output.stamp, to_message(output, shell_.frames));
   write(topics::kFilteredFix, output.stamp, to_fix_message(output, *pipeline_.frame(), shell_.frames));
   tf2_msgs::TFMessage tf;
