@@ -110,6 +110,14 @@ class StoredResults(unittest.TestCase):
         self.assertIn("{:.0f} % in position, and the heading is {:.0f} % worse".format(
             change("paper_as_printed", "conventional_as_printed", "position_mean_m"),
             change("paper_as_printed", "conventional_as_printed", "heading_mean_rad")), text)
+        downtown = results["scenarios"]["downtown_grid"]
+        errors = downtown["trajectory"]
+        self.assertIn("calls {:.0f} % of the good fixes bad".format(
+            100.0 * (1.0 - downtown["classification"]["paper_as_printed"]["correct_of_good"])), text)
+        self.assertIn("its position is {:.0f} % worse".format(
+            change("paper_as_printed", "conventional_as_printed", "position_mean_m")), text)
+        self.assertIn("position is {:.0f} % better than the conventional one's, its orientation {:.0f} %".format(
+            change("soft", "conventional", "position_mean_m"), change("soft", "conventional", "heading_mean_rad")), text)
 
     def test_bag_with_lidar(self):
         """Every row of the tables of the bag, and the command."""
