@@ -58,6 +58,8 @@ class CommandLine {
     output_folders_.push_back(option);
     return option;
   }
+  /// Where this option is given, the outputs are folders, and the program checks the files that it writes there.
+  void outputs_are_folders_with(const CLI::Option* option) { folders_with_ = option; }
   void add_json(std::string& file) { add_output("--json", file, "write the results here"); }
   void add_jobs(int& threads) {
     threads = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
@@ -119,6 +121,7 @@ class CommandLine {
     }
   }
   void check_outputs() const {
+    if (folders_with_ != nullptr && folders_with_->count() > 0) return;
     std::set<std::filesystem::path> known;
     for (const CLI::Option* option : outputs_) {
       if (option->count() == 0 || option->results().back().empty()) continue;
@@ -137,6 +140,7 @@ class CommandLine {
   CLI::App app_;
   std::vector<const CLI::Option*> outputs_;
   std::vector<const CLI::Option*> output_folders_;
+  const CLI::Option* folders_with_{nullptr};
   InputFiles inputs_;
 };
 

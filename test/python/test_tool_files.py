@@ -187,6 +187,33 @@ class WholeTest(FilesTest):
         self.expect_refusal("wrong.bag", "replay", "wrong.bag", "--output", "new.bag", "--tum", "new.tum")
         self.assertFalse(os.path.exists(self.path("new.bag")) or os.path.exists(self.path("new.tum")))
 
+    def test_each_bag_for_itself(self):
+        """With --jobs, what each bag gives alone; a bag that fails does not stop the others."""
+        self.succeed("replay", "drive_none.bag", "--json", "one.json", "--tum", "one.tum", "--output", "one.bag")
+        shutil.copy(self.path("drive_none.bag"), self.path("again.bag"))
+        with open(self.path("broken.bag"), "w") as file:
+            file.write("no bag")
+        text = self.expect_refusal("broken.bag: is no bag", "replay", "drive_none.bag", "broken.bag", "again.bag", "--jobs",
+                                   "2", "--json", "night", "--tum", "night", "--output", "night")
+        self.assertIn("1 of 3 bags failed", text)
+        self.assertEqual(sorted(os.listdir(self.path("night"))),
+                         sorted(stem + "." + kind for stem in ("drive_none", "again") for kind in ("bag", "json", "tum")))
+        for kind in ("bag", "tum"):
+            for stem in ("drive_none", "again"):
+                self.assertEqual(content(self.path("night", stem + "." + kind)), content(self.path("one." + kind)), kind)
+        with open(self.path("night", "again.json")) as night, open(self.path("one.json")) as one:
+            again, alone = json.load(night), json.load(one)
+        self.assertEqual(again.pop("bag"), "again.bag")
+        alone.pop("bag")
+        self.assertEqual(again, alone)
+
+    def test_each_bag_has_results_of_its_own(self):
+        os.mkdir(self.path("other"))
+        shutil.copy(self.path("drive_none.bag"), self.path("other", "drive_none.bag"))
+        self.expect_refusal("two bags are named drive_none", "replay", "drive_none.bag", "other/drive_none.bag", "--jobs", "2",
+                            "--json", "night")
+        self.expect_refusal("is the file that is read", "replay", "drive_none.bag", "--jobs", "1", "--output", ".")
+
     def test_a_signal(self):
         for number in (signal.SIGINT, signal.SIGTERM):
             process = subprocess.Popen([os.path.join(PROGRAMS, "simulate"), "--scenario", "downtown_grid", "--output",

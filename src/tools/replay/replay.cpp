@@ -6,6 +6,7 @@
 #include <iomanip>
 #include <iostream>
 #include <nlohmann/json.hpp>
+#include <sstream>
 
 #include "command_line.hpp"
 #include "files/output_file.hpp"
@@ -13,6 +14,7 @@
 #include "replay_inputs.hpp"
 #include "replay_run.hpp"
 #include "replay_settings.hpp"
+#include "several_recordings.hpp"
 #include "urban_gnss_localization/common/progress.hpp"
 #include "urban_gnss_localization/evaluation/report_json.hpp"
 #include "urban_gnss_localization/ros/conversions.hpp"
@@ -128,7 +130,8 @@ void check_occlusion(const ReplayOptions& options) {
   }
 }
 
-void run(const ReplayOptions& options, const LocalizerRegistry& localizers, const InputFiles& files) {
+/// The results as JSON, which stand on standard output, too. Throws std::runtime_error where there is no estimate.
+nlohmann::json run(const ReplayOptions& options, const LocalizerRegistry& localizers, const InputFiles& files) {
   const ReplaySettings settings = read_settings(options, localizers);
   ReplayInputs inputs(options);
 
@@ -167,6 +170,57 @@ void run(const ReplayOptions& options, const LocalizerRegistry& localizers, cons
     throw std::runtime_error("no estimate: " +
                              (missing.empty() ? "nothing came after the start" : "still waiting for " + missing));
   }
+  return metrics;
+}
+
+/// "19787 estimates; 1978 accepted, 16 not_examined; position error median 0.83, 95 % 2.17 m".
+std::string line_of(const nlohmann::json& metrics) {
+  std::ostringstream line;
+  line << metrics["estimates"] << " estimates";
+  const char* separator = "; ";
+  for (const auto& [decision, count] : metrics["decisions"].items()) {
+    line << separator << count << ' ' << decision;
+    separator = ", ";
+  }
+  if (!metrics.contains("errors")) return line.str();
+  const auto& position = metrics["errors"]["position_m"];
+  if (!position["median"].is_number() || !position["p95"].is_number()) return line.str();
+  line << std::fixed << std::setprecision(2) << "; position error median " << position["median"].get<double>()
+       << ", 95 % " << position["p95"].get<double>() << " m";
+  return line.str();
+}
+
+/// Each bag for itself; throws std::runtime_error where one of them failed.
+void run_each(const ReplayOptions& options, int jobs, const LocalizerRegistry& localizers, const InputFiles& files) {
+  const auto names = [&](const std::string& folder, const char* extension) {
+    return folder.empty() ? std::vector<std::string>(options.bags.size())
+                          : files_beside(folder, options.bags, extension);
+  };
+  const auto outputs = names(options.output, ".bag");
+  const auto jsons = names(options.json_file, ".json");
+  const auto tums = names(options.tum_file, ".tum");
+  std::size_t failed = 0;
+  const auto work = [&](std::size_t i) {
+    ReplayOptions one = options;
+    one.bags = {options.bags[i]};
+    one.output = outputs[i];
+    one.json_file = jsons[i];
+    one.tum_file = tums[i];
+    return line_of(run(one, localizers, files));
+  };
+  run_in_processes(options.bags.size(), jobs, work, [&](std::size_t i, const RecordingResult& result) {
+    if (result.is_done) {
+      std::cout << options.bags[i] << ": " << result.text << std::endl;
+    } else {
+      ++failed;
+      std::cerr << "replay: " << result.text
+                << (result.text.find(options.bags[i]) == std::string::npos ? " (read: " + options.bags[i] + ")" : "")
+                << std::endl;
+    }
+  });
+  if (failed > 0) {
+    throw std::runtime_error(std::to_string(failed) + " of " + std::to_string(options.bags.size()) + " bags failed");
+  }
 }
 
 void print_variants(const LocalizerRegistry& localizers) {
@@ -180,7 +234,7 @@ int replay_main(int argc, char** argv, const LocalizerRegistry& localizers) {
   CommandLine line("replay",
                    "Runs a bag through a localizer offline; the same input, parameters and seed give the same output.");
   CLI::App& app = line.app();
-  app.add_option("bag", options.bags, "the bag to read; several are parts of one recording");
+  app.add_option("bag", options.bags, "the bag to read; several are parts of one recording, but with --jobs");
   bool only_names = false;
   bool only_receivers = false;
   std::string odometry = "topic";
@@ -218,6 +272,12 @@ int replay_main(int argc, char** argv, const LocalizerRegistry& localizers) {
   app.add_option("--nmea", options.nmea,
                  "log of NMEA 0183 in place of the bag's fixes, velocities and satellites; its stamps are UTC");
   app.add_option("--nmea-date", options.nmea_date, "YYYY-MM-DD of its first sentence, in place of the log's own dates");
+  int jobs = 0;
+  const auto* each = app.add_option("--jobs", jobs,
+                                    "each bag is a recording of its own, so many of them at a time; --output, --json "
+                                    "and --tum are folders then, for a file of each bag's name")
+                         ->check(CLI::PositiveNumber)
+                         ->excludes("--nmea");
   auto* occlusion = app.add_flag("--occlusion", options.occlusion,
                                  "the localizer gets the fixes as occlusion_node weighs them, by the bag's point "
                                  "clouds, tf and satellites (docs/occlusion.md)");
@@ -236,6 +296,7 @@ int replay_main(int argc, char** argv, const LocalizerRegistry& localizers) {
   app.add_option("--seed", options.seed, "seed of the random numbers; default: as in the parameters");
   line.add_json(options.json_file);
   line.add_output("--tum", options.tum_file, "write the trajectory here (TUM format, ENU about the datum)");
+  line.outputs_are_folders_with(each);
   return line.run(argc, argv, [&] {
     if (only_names) return print_variants(localizers);
     if (only_receivers) {
@@ -252,6 +313,7 @@ int replay_main(int argc, char** argv, const LocalizerRegistry& localizers) {
     options.without_odometry = odometry == "none";
     if (options.occlusion) check_occlusion(options);
     if (!options.robot.empty()) line.reads(package_path() / "config" / "robots");
+    if (each->count() > 0) return run_each(options, jobs, localizers, line.inputs());
     run(options, localizers, line.inputs());
   });
 }

@@ -17,7 +17,7 @@ namespace urban_gnss {
 namespace {
 
 constexpr double kNever = std::numeric_limits<double>::quiet_NaN();
-constexpr std::size_t kMostLines = 3;  // of one kind; the others are counted
+constexpr std::size_t kMostLines = 3;           // of one kind; the others are counted
 constexpr std::size_t kMostReserved = 1000000;  // whatever a damaged index says
 constexpr double kKnownHeading_rad = degrees_to_radians(10.0);
 
@@ -212,7 +212,8 @@ void ReplayRun::take(const LocalizationOutput& output) {
   write(topics::kEstimate, output.stamp, to_message(output, shell_.frames));
   write(topics::kFilteredFix, output.stamp, to_fix_message(output, *pipeline_.frame(), shell_.frames));
   tf2_msgs::TFMessage tf;
-  tf.transforms.push_back(to_map_to_odom(slew_.follow(output), output.stamp, shell_.frames, shell_.transform_time_offset));
+  tf.transforms.push_back(
+      to_map_to_odom(slew_.follow(output), output.stamp, shell_.frames, shell_.transform_time_offset));
   write(kTf, output.stamp, tf);
   if (occlusion_) occlusion_->add_estimate(output, tf.transforms.front());
 }
