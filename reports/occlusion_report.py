@@ -266,6 +266,13 @@ def map_panels(truths, columns, width):
     return figure, by_place
 
 
+def legend_above(figure, panels):
+    """Of what the first panel shows."""
+    handles = next(iter(panels.values())).get_legend_handles_labels()[0]
+    return figure.legend(handles=handles, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncol=len(handles),
+                         frameon=False)
+
+
 def plot_figure6(path, fixes, truths):
     """The fixes, green where a model calls them good and red where bad, on the true trajectory; a column per model."""
     figure, panels = map_panels({s: truths[s] for s in fixes}, models_in(fixes), 3.2)
@@ -275,8 +282,7 @@ def plot_figure6(path, fixes, truths):
             chosen = rows["good_" + model] == good
             axes.plot(rows["x"][chosen], rows["y"][chosen], ".", color=colour, markersize=2.0, zorder=3 - good,
                       label=label)
-    legend = next(iter(panels.values())).legend(fontsize=7, loc="best")
-    for handle in legend.get_lines():
+    for handle in legend_above(figure, panels).get_lines():
         handle.set_markersize(8)
     common.save_figure(figure, path)
 
@@ -289,7 +295,7 @@ def plot_figure7(path, truths, estimates):
         for model in settings[setting]:
             rows = estimates[scenario][model]
             axes.plot(rows["x"], rows["y"], color=colour_of(model), linewidth=1.0, label=model.replace(AS_PRINTED, ""))
-    next(iter(panels.values())).legend(fontsize=8, loc="best")
+    legend_above(figure, panels)
     common.save_figure(figure, path)
 
 
