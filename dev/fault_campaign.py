@@ -44,6 +44,7 @@ TOGETHER = 5         # odd messages, before what came of them is judged; each by
 BETWEEN = 2          # good moments between them
 SETTLE = 6           # batches, after which a reset has been said
 HISTORY = (1, 3, 10, 40)
+OTHERS_SERVICES = ("set_logger_level", "get_loggers", "load_nodelet", "unload_nodelet", "list")  # of ROS itself
 
 
 class Session:
@@ -83,7 +84,7 @@ class Session:
             for topic, kind in self.master.publications(node).items():
                 self.ends.subscribe(topic, genpy.message.get_message_class(kind), nodes)
             for name in self.master.services(node):
-                if not name.endswith(("_logger_level", "/get_loggers")) and not name.startswith(node + "/load_nodelet"):
+                if name.rsplit("/", 1)[1] not in OTHERS_SERVICES:
                     self.services[name] = rosservice.get_service_class_by_name(name)
         fault_graph.await_(self.is_connected, "connections of " + self.rig.name)
 
@@ -321,8 +322,9 @@ class Campaign:
         try:
             import rospy
             rospy.init_node("fault_campaign", disable_signals=True, disable_rosout=True, log_level=rospy.FATAL)
+            import fault_receivers
             import fault_rigs
-            rigs = fault_rigs.all_rigs()
+            rigs = fault_receivers.receiver_rigs() + fault_rigs.all_rigs()
             wanted = [rig for rig in rigs if not self.options.rigs or rig.name in self.options.rigs]
             self.seconds_left = self.options.seconds or 1e9
             self.left = self.options.cases

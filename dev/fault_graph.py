@@ -100,7 +100,11 @@ class Node:
         for key, value in self.parameters.items():
             rospy.set_param(self.name + "/" + key, value)
         space, name = self.name.rsplit("/", 1)
-        command = ["rosrun", self.package, self.program] if self.package else campaign.program(self.program)
+        command = campaign.program(self.program)
+        if self.package:
+            command = ["rosrun", self.package, self.program]
+        elif os.path.isabs(self.program):
+            command = [self.program]
         words = self.arguments + ["__name:=" + name, "__ns:=" + (space or "/")]
         words += ["%s:=%s" % remap for remap in self.remaps.items()]
         # pylint: disable=consider-using-with,subprocess-popen-preexec-fn

@@ -21,11 +21,11 @@ from fault_graph import Node
 
 sys.path.insert(0, os.path.join(campaign.ROOT, "test", "ros"))
 import drive  # noqa: E402
-import driver_messages  # noqa: E402
 import street  # noqa: E402
 
 START_S = 100000.0
 TF_EVERY = 5
+SECOND = "two/"  # namespace of the second of two nodelets
 
 
 class Stream:
@@ -190,6 +190,17 @@ class StreetStream(Stream):
         return street.make_fix(stamp)
 
 
+class TwoStreetsStream(StreetStream):
+    """The same for two, each on topics of its own."""
+
+    def topics(self):
+        own = [topic for topic in super().topics() if not topic.startswith("/")]
+        return super().topics() + [SECOND + topic for topic in own]
+
+    def make(self, topic, later_s=0.0):
+        return super().make(topic[len(SECOND):] if topic.startswith(SECOND) else topic, later_s)
+
+
 class EstimateStream(Stream):
     """What a controller takes."""
 
@@ -198,27 +209,6 @@ class EstimateStream(Stream):
 
     def topics(self):
         return ["odometry/filtered"] + (["gps/datum"] if self.index % 20 == 1 else [])
-
-
-class NmeaStream(Stream):
-    """Sentences of a receiver."""
-
-    steps = 5
-    warm_steps = 20
-    kind = driver_messages.types("nmea_msgs/Sentence", driver_messages.SENTENCE)["Sentence"]
-
-    def topics(self):
-        return ["nmea_sentence"]
-
-    def make(self, topic, later_s=0.0):
-        if topic != "nmea_sentence":
-            return super().make(topic, later_s)
-        seconds = int((self.now + later_s) * 10)
-        clock = "%02d%02d%02d.%d" % (seconds // 36000 % 24, seconds // 600 % 60, seconds // 10 % 60, seconds % 10)
-        body = "GPGGA,%s,4808.2440,N,01134.5300,E,1,08,1.0,520.0,M,0.0,M,," % clock
-        message = self.kind(sentence=driver_messages.with_checksum(body))
-        message.header.stamp, message.header.frame_id = self.stamp(later_s), "gps"
-        return message
 
 
 class ComparisonStream(Stream):
@@ -291,14 +281,24 @@ def all_rigs():
                    {"/%s/%sgps/fix_weighted" % (name, space): "late" for space in ("", "nodelet/")}, ("/tf_static",),
                    only=only)
 
+    def one_manager():
+        """Two nodelets in one process. Loaders without a bond: their nodelets are the manager's, and have no topics
+        beside their own. They are not ended, as nobody would load the nodelets anew."""
+        manager = "/one_manager/manager"
+        load = ("load", "urban_gnss_localization/occlusion", manager, "--no-bond")
+        loaders = [Node("nodelet", "/one_manager/%sloader" % space, {"expert/sky_plot_size": 60}, load, "nodelet")
+                   for space in ("", SECOND)]
+        return Rig("one_manager", TwoStreetsStream,
+                   [Node("nodelet", manager, arguments=("manager",), package="nodelet")] + loaders,
+                   {"/one_manager/%sgps/fix_weighted" % space: "late" for space in ("", SECOND)}, ("/tf_static",),
+                   only=("field", "stream", "service"))
+
     def controller(name, stream, only=None):
         return Rig(name, stream, [Node("waypoint_controller_node", "/%s/controller" % name, targets)],
                    {"/%s/cmd_vel" % name: "count"}, ("/%s/gps/datum" % name,), only=only)
 
     return [
         controller("controller", EstimateStream),
-        Rig("receiver", NmeaStream, [Node("receiver_node", "/receiver/receiver", {"receiver": "nmea"})],
-            {"/receiver/gps/fix": "count"}),
         Rig("comparison", ComparisonStream,
             [Node("comparison_node", "/comparison/comparison", {"localizers": "one two", "plot_rate": 20.0})],
             {"/comparison/error_plot": "stamp"}),
@@ -312,6 +312,7 @@ def all_rigs():
         localizer("particle_filter", parameters={"expert/particle_count": 200, "expert/particle_cloud_rate": 1.0},
                   others=[Node("gps_bias_node", "/particle_filter/gps_bias", {"localizer": "localizer"})]),
         occlusion("occlusion", StreetStream),
+        one_manager(),
         localizer("complementary_ekf", PlainStream),
         localizer("ukf"),
         localizer("switching_particle_filter", parameters={"expert/particle_cloud_rate": 1.0}),
