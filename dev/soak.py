@@ -23,7 +23,8 @@ import signal
 import sys
 import threading
 import time
-import xmlrpc.client
+
+import yaml
 
 import campaign
 import fault_graph
@@ -33,6 +34,8 @@ LEAST_S = 1200.0    # of wall time, for a slope
 LATE_SHARE = 0.01   # of the decisions, of which is said what they waited for
 TICKS = os.sysconf("SC_CLK_TCK")
 PAGE_MB = os.sysconf("SC_PAGE_SIZE") / 1e6
+COUNTS = ("clouds received", "clouds in the map", "clouds dropped", "alignments tried", "alignments accepted",
+          "callbacks that failed", "odd stamps left out")
 PARTS = ("odometry after the fix", "satellites", "occlusion_node", "localizer")
 
 
@@ -165,9 +168,23 @@ class Delays:
             return result
 
 
-def nodes_of(options):
-    scenario = options.scenario if "/" in options.scenario else os.path.join(campaign.ROOT, "scenarios",
-                                                                            options.scenario + ".yaml")
+def write_rounds(options, folder):
+    """The scenario with a route that leads back to its begin, as a file."""
+    name = options.scenario if "/" in options.scenario else os.path.join(campaign.ROOT, "scenarios",
+                                                                        options.scenario + ".yaml")
+    with open(name) as stream:
+        scenario = yaml.safe_load(stream)
+    scenario["route"]["loop"] = True
+    scenario["duration"] = options.seconds + 600.0
+    if "start_time" in scenario:
+        scenario["start_time"] = scenario["start_time"].strftime("%Y-%m-%dT%H:%M:%SZ")
+    file = os.path.join(folder, os.path.basename(name))
+    with open(file, "w") as stream:
+        yaml.safe_dump(scenario, stream)
+    return file
+
+
+def nodes_of(options, scenario):
     simulator = {"field": "city", "scenario": scenario, "follow_route": True, "real_time_factor": options.factor,
                  "start_delay": 3.0, "expert/wait_for_command": False, "expert/publish_clock": False}
     return [fault_graph.Node("occlusion_node", "/occlusion", {"body_radius": 3.5}),  # the simulated car's bonnet
@@ -185,7 +202,7 @@ def subscribe(rospy, options, delays, counts):
     def on_diagnostics(message):
         for status in message.status:
             for value in status.values:
-                if value.key in ("clouds received", "clouds dropped", "callbacks that failed", "odd stamps left out"):
+                if value.key in COUNTS:
                     counts[status.name + ": " + value.key] = int(value.value)
 
     rospy.Subscriber("/diagnostics", DiagnosticArray, on_diagnostics, queue_size=100)
@@ -199,7 +216,8 @@ def subscribe(rospy, options, delays, counts):
 
 def run(options):
     """The report of a run."""
-    master, nodes = fault_graph.Master(), nodes_of(options)
+    master = fault_graph.Master()
+    nodes = nodes_of(options, write_rounds(options, master.logs))
     try:
         import rospy
         rospy.init_node("soak", disable_signals=True, disable_rosout=True, log_level=rospy.FATAL)

@@ -59,7 +59,9 @@ class GpsdNode {
     } else {
       decoder_.settle();
     }
-    publish(decoder_.take());
+    ReceiverOutput output = decoder_.take();
+    make_sound(output);
+    publish(output);
     if (!lines_.is_open()) {
       is_connected_ = false;
       decoder_.reset();

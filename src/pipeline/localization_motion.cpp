@@ -58,6 +58,7 @@ void LocalizationPipeline::add_odometry(const OdometrySample& message) {
     correct_heading();
     guard_state(pose_fault(localizer_->pose()));
   }
+  if (saved_) start_from_state(sample.stamp);
   if (!initialized() && start_.given() && frame()) start_from(told(*start_.given(), "the given pose"));
   process_velocities();
   process_fixes();

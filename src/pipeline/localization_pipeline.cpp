@@ -64,6 +64,7 @@ void LocalizationPipeline::reset(const std::string& why) {
   residuals_.reset();
   biases_.reset();
   start_.reset();
+  saved_.reset();
   integrity_.reset();
   reporter_.reset();
   is_gate_inert_ = false;
@@ -323,7 +324,35 @@ void LocalizationPipeline::decide(FixOutcome outcome) {
 
 void LocalizationPipeline::set_pose(const PoseEstimate& pose) {
   start_.give(pose);
+  saved_.reset();
   if (frame() && !history_.empty()) start_from(told(*start_.given(), "a pose that was set"));
+}
+
+void LocalizationPipeline::restore(const SavedState& state, const SavedStateParameters& parameters) {
+  saved_.emplace(state, parameters);
+}
+
+void LocalizationPipeline::start_from_state(Stamp now) {
+  const auto [state, parameters] = *std::exchange(saved_, std::nullopt);
+  std::string fault = age_fault(state, now, parameters);
+  if (fault.empty() && frame() && !(frame()->datum() == state.datum)) fault = "its datum is another";
+  if (!fault.empty()) {
+    event(Level::kWarn, "saved state left out: " + fault);
+    return;
+  }
+  if (datum_.set(state.datum, "the saved state")) event(Level::kInfo, datum_.describe());
+  start_.give(estimate_at(state, now, parameters));
+  start_from(told(*start_.given(), "the saved state, " + seconds_text(to_seconds(now - state.stamp)) + " old"));
+}
+
+std::optional<SavedState> LocalizationPipeline::state() const {
+  const bool is_known = initialized() && start_.has_heading() && !start_.is_lost() && !integrity_.is_unconfirmed();
+  if (!is_known || !frame() || history_.empty()) return std::nullopt;
+  SavedState state;
+  state.stamp = history_.latest();
+  state.datum = frame()->datum();
+  state.estimate = estimate();
+  return state_fault(state).empty() ? std::make_optional(state) : std::nullopt;
 }
 
 void LocalizationPipeline::set_datum(const GeodeticPosition& datum) {

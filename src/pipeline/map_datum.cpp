@@ -19,9 +19,9 @@ void MapDatum::add(const RawFix& fix) {
   }
 }
 
-bool MapDatum::set(const GeodeticPosition& datum) {
+bool MapDatum::set(const GeodeticPosition& datum, const std::string& source) {
   const bool is_another = !frame_ || !(frame_->datum() == datum);
-  if (is_another) use(datum, "request");
+  if (is_another) use(datum, source);
   return is_another;
 }
 

@@ -122,8 +122,14 @@ bool OcclusionQueue::work() {
   update_alignment();
   const bool has_settled = !clouds_.empty() && insert(clouds_.front());
   if (has_settled) clouds_.pop_front();
-  while (!fixes_.empty() && assess(fixes_.front())) fixes_.pop_front();
+  settle_fixes();
   return has_settled;
+}
+
+void OcclusionQueue::settle_fixes() {
+  if (fixes_.empty()) return;
+  update_alignment();
+  while (!fixes_.empty() && assess(fixes_.front())) fixes_.pop_front();
 }
 
 void OcclusionQueue::finish() {

@@ -2,8 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 #include <utility>
+
+#include "urban_gnss_localization/common/covariance_faults.hpp"
 
 namespace urban_gnss {
 namespace {
@@ -11,19 +14,44 @@ namespace {
 constexpr std::size_t kMaxRecent = 100;
 constexpr double kClockSetBack_s = 1.0;
 
-/// A fix without a finite place is none; its altitude may be unknown. A covariance that is not finite is not declared.
-void make_finite(RawFix& fix) {
+/// Whether a message's float can hold it.
+bool is_float(double value) { return std::abs(value) <= std::numeric_limits<float>::max(); }
+
+void make_sound(RawFix& fix) {
   if (!std::isfinite(fix.position.latitude_deg) || !std::isfinite(fix.position.longitude_deg)) {
     fix.position = {};
     fix.has_fix = false;
   }
-  if (!fix.covariance.allFinite()) {
+  if (std::isinf(fix.position.altitude_m)) fix.position.altitude_m = std::numeric_limits<double>::quiet_NaN();
+  if (!covariance_fault(fix.covariance, {"east", "north", "up"}).empty()) {
     fix.covariance.setZero();
     fix.covariance_type = CovarianceType::kUnknown;
   }
 }
 
+void make_sound(SatelliteObservation& satellite) {
+  for (double* each :
+       {&satellite.look.azimuth_rad, &satellite.look.elevation_rad, &satellite.cn0_dbhz, &satellite.residual_m}) {
+    if (!is_float(*each)) *each = SatelliteObservation::kUnknown;
+  }
+}
+
 }  // namespace
+
+void make_sound(ReceiverOutput& output) {
+  for (RawFix& fix : output.fixes) make_sound(fix);
+  std::vector<RawVelocity>& velocities = output.velocities;
+  velocities.erase(std::remove_if(velocities.begin(), velocities.end(),
+                                  [](const RawVelocity& each) { return !each.velocity.allFinite(); }),
+                   velocities.end());
+  for (RawVelocity& velocity : velocities) {
+    if (!covariance_fault(velocity.covariance, {"east", "north"}).empty()) velocity.covariance.setZero();
+  }
+  for (SatelliteEpoch& epoch : output.satellites) {
+    if (!is_float(epoch.angle_resolution_rad)) epoch.angle_resolution_rad = 0.0;
+    for (SatelliteObservation& satellite : epoch.satellites) make_sound(satellite);
+  }
+}
 
 ReceiverCounter::Solution& ReceiverCounter::at(Stamp stamp) {
   const auto known =
@@ -112,14 +140,7 @@ ReceiverOutput ReceiverInput::take() {
   ReceiverOutput output = decoder_->take();
   std::vector<std::string> warnings = std::exchange(warnings_, {});
   output.warnings.insert(output.warnings.begin(), warnings.begin(), warnings.end());
-  for (RawFix& fix : output.fixes) make_finite(fix);
-  for (RawVelocity& velocity : output.velocities) {
-    if (!velocity.covariance.allFinite()) velocity.covariance.setZero();
-  }
-  std::vector<RawVelocity>& velocities = output.velocities;
-  velocities.erase(std::remove_if(velocities.begin(), velocities.end(),
-                                  [](const RawVelocity& each) { return !each.velocity.allFinite(); }),
-                   velocities.end());
+  make_sound(output);
   counter_.add(output);
   return output;
 }

@@ -22,6 +22,7 @@ LocalizerNode::LocalizerNode(ros::NodeHandle& node, ros::NodeHandle& private_nod
       on_output_(std::move(on_output)),
       slew_(parameters.slew),
       sensor_frames_(parameters.frames, parameters.wants_antenna_from_tf()),
+      state_(private_node, parameters.frames, log_),
       diagnostics_(ros::NodeHandle(), private_node) {
   const std::string fused = why_not_a_receiver(node.resolveName(topics::kFix));
   if (!fused.empty()) throw std::runtime_error(std::string(topics::kFix) + ": " + fused);
@@ -30,6 +31,7 @@ LocalizerNode::LocalizerNode(ros::NodeHandle& node, ros::NodeHandle& private_nod
   status_publisher_ = private_node.advertise<urban_gnss_localization::LocalizationStatus>(topics::kStatus, 100);
   datum_publisher_ = node.advertise<sensor_msgs::NavSatFix>(topics::kDatum, 1, true);
 
+  state_.restore(pipeline_, parameters.state);
   tf_.emplace(node, io_);
   subscribe(node);
   serve(node, private_node);
@@ -249,6 +251,7 @@ void LocalizerNode::every_second() {
   look_up_sensors();
   sensor_frames_.complain();
   publish_status();
+  state_.save(pipeline_);
   diagnostics_.force_update();
 }
 
@@ -289,6 +292,7 @@ void LocalizerNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status
   status.add("tf behind the estimate (m)", slew_.behind_m());
   status.add("odd stamps left out", pipeline_.odd_stamps());
   status.add("broken states", pipeline_.broken_states());
+  status.add("saved state", state_.news());
   io_.diagnose(status);
 }
 

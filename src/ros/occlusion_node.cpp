@@ -48,6 +48,7 @@ OcclusionNode::OcclusionNode(ros::NodeHandle& node, ros::NodeHandle& private_nod
 
   diagnostics_.setHardwareID("none");
   diagnostics_.add("occlusion", this, &OcclusionNode::diagnose);
+  fix_timer_ = io_.every(node, 0.005, "the fixes' timer", [this] { settle_fixes(); });
   work_timer_ = io_.every(node, 0.02, "the node's work", [this] { work(); });
   second_timer_ = io_.every(node, 1.0, "the node's timer", [this] { every_second(); });
   five_second_timer_ = io_.every(node, 5.0, "the node's timer", [this] { every_five_seconds(); });
@@ -73,7 +74,7 @@ void OcclusionNode::subscribe(ros::NodeHandle& node, bool takes_imu) {
 
 OcclusionNode::~OcclusionNode() { fix_subscriber_.shutdown(); }  // fix_watch_ holds it too
 
-/// Only queues the cloud, for the timer or the next fix: who works here leaves the next clouds to ROS's own queue,
+/// Only queues the cloud, for the timer: who works here leaves the next clouds to ROS's own queue,
 /// which drops them without a word.
 void OcclusionNode::on_cloud(const sensor_msgs::PointCloud2ConstPtr& message) {
   queue_->add_cloud(to_queued_cloud(message));
@@ -98,11 +99,18 @@ void OcclusionNode::on_fix(const sensor_msgs::NavSatFixConstPtr& message) {
   fix_watch_.observe_frame(message->header.frame_id);
   queue_->add_fix(
       to_queued_fix(message, [this, message](const FixAssessment* assessment) { publish(message, assessment); }));
-  work();
+  settle_fixes();
+}
+
+/// A fix waits for nothing but its transform and its satellites, and for the cloud that is just put into the map.
+void OcclusionNode::settle_fixes() {
+  queue_->settle_fixes();
+  io_.report(queue_->take_events());
 }
 
 /// One cloud, then what has come meanwhile.
 void OcclusionNode::work() {
+  queue_->settle_fixes();
   queue_->work();
   io_.report(queue_->take_events());
 }

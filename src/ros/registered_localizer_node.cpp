@@ -9,7 +9,10 @@ namespace urban_gnss {
 RegisteredLocalizerNode::RegisteredLocalizerNode(ros::NodeHandle& node, ros::NodeHandle& private_node,
                                                  const LocalizerEntry& entry) {
   LocalizerNodeSettings settings(entry);
-  read_private_parameters(private_node, settings);
+  ParameterReader reader = private_parameter_reader(private_node);
+  reader.ignore(kStateFile);  // StateKeeper reads it
+  reader.read(settings);
+  finish_reading(private_node, reader);
   std::unique_ptr<Localizer> localizer = settings.localizer->make();
   const std::string& frame = settings.shell.frames.map;
   if (settings.has_particles) particles_.emplace(node, settings.particles, frame);

@@ -151,6 +151,20 @@ TEST_F(OcclusionQueueTest, CloudAndFixWaitForTheirTransform) {
   EXPECT_EQ(settled[0].first_blocked, 1.0) << "the cloud goes in first";
 }
 
+TEST_F(OcclusionQueueTest, AFixThatIsSettledAloneDoesNotWaitForTheCloudsBeforeIt) {
+  epoch(1.0);
+  tell_pose(1.2);
+  add_cloud(1.1);
+  add_cloud(1.2);
+  add_satellites(1.2);
+  add_fix(1.2);
+  queue.settle_fixes();
+  EXPECT_EQ(settled.size(), 2u);
+  EXPECT_EQ(queue.tally().clouds_in_map, 1u) << "that of the epoch before";
+  work();
+  EXPECT_EQ(queue.tally().clouds_in_map, 3u);
+}
+
 TEST_F(OcclusionQueueTest, NothingWaitsForATransformThatDoesNotCome) {
   tell_pose(0.0);
   add_cloud(0.2);

@@ -50,6 +50,21 @@ TEST(Robustness, OneOddMessageOfAnyStreamNeverResets) {
   }
 }
 
+TEST(Robustness, AfterAPauseOfAllStreamsTheFirstMessagesAreHeldAndNoneIsLost) {
+  Rig rig(kGiven);
+  rig.run(0.0, 20.0);
+  rig.pipeline.take_outcomes();
+  rig.fix(50.0);
+  for (int k = 500; k <= 501; ++k) rig.drive(0.1 * k);
+  EXPECT_EQ(*rig.pipeline.latest_odometry(), Rig::at(20.0)) << "two may be wrong";
+  rig.drive(50.2);
+  EXPECT_EQ(*rig.pipeline.latest_odometry(), Rig::at(50.2));
+  rig.run(50.3, 60.0);
+  EXPECT_EQ(*rig.pipeline.latest_odometry(), Rig::at(60.0));
+  EXPECT_EQ(rig.pipeline.take_outcomes().size(), 11u) << "each fix has its decision";
+  EXPECT_EQ(rig.pipeline.odd_stamps(), 0u);
+}
+
 TEST(Robustness, RefusesAPoseThatIsNone) {
   const auto refusal = [](const PoseEstimate& pose) -> std::string {
     Rig rig(kGiven);

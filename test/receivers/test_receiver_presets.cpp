@@ -1,6 +1,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <limits>
 #include <random>
 
 #include "driver_messages.hpp"
@@ -65,6 +67,42 @@ TEST(MavrosDecoder, MinusOneIsNoCovariance) {
     EXPECT_EQ(feed.output().fixes.at(0).covariance_type, CovarianceType::kUnknown);
     EXPECT_TRUE(feed.output().fixes[0].covariance.isZero());
   }
+}
+
+TEST(ReceiverInput, WhatIsNoNumberDoesNotGoOn) {
+  constexpr double kInfinite = std::numeric_limits<double>::infinity();
+  for (const double bad : {kInfinite, -kInfinite, std::nan(""), 1e300}) {
+    ReceiverOutput output;
+    output.fixes.resize(1);
+    output.fixes[0].position = {48.0, 11.0, bad};
+    output.fixes[0].covariance_type = CovarianceType::kKnown;
+    output.fixes[0].covariance = Eigen::Vector3d(4.0, -1.0, 9.0).asDiagonal();
+    output.velocities.resize(2);
+    output.velocities[0].velocity.y() = bad;
+    output.velocities[1].velocity = {1.0, 2.0};
+    output.velocities[1].covariance << 0.1, bad, bad, 0.1;
+    output.satellites.push_back({Stamp(0), {{}}, bad});
+    SatelliteObservation& satellite = output.satellites[0].satellites[0];
+    satellite.look = {bad, bad};
+    satellite.cn0_dbhz = satellite.residual_m = bad;
+    make_sound(output);
+    EXPECT_TRUE(output.fixes[0].has_fix);
+    EXPECT_FALSE(std::isinf(output.fixes[0].position.altitude_m));
+    EXPECT_EQ(output.fixes[0].covariance_type, CovarianceType::kUnknown);
+    EXPECT_TRUE(output.fixes[0].covariance.isZero());
+    EXPECT_EQ(output.velocities.size(), std::isfinite(bad) ? 2u : 1u);
+    EXPECT_TRUE(output.velocities.back().covariance.isZero()) << "a correlation beyond 1 is none, either";
+    EXPECT_EQ(output.satellites[0].angle_resolution_rad, 0.0);
+    for (const double value :
+         {satellite.look.azimuth_rad, satellite.look.elevation_rad, satellite.cn0_dbhz, satellite.residual_m}) {
+      EXPECT_TRUE(std::isnan(value)) << bad << ": also where a float cannot hold it";
+    }
+  }
+  ReceiverOutput nowhere;
+  nowhere.fixes.resize(1);
+  nowhere.fixes[0].position.latitude_deg = kInfinite;
+  make_sound(nowhere);
+  EXPECT_FALSE(nowhere.fixes[0].has_fix);
 }
 
 TEST(MavrosDecoder, AStampOfZeroIsThatOfTheArrivalAndSaidSo) {

@@ -134,6 +134,19 @@ TEST(MessageFaults, APoseThatIsToldHasAQuaternionAndACovariance) {
   }
 }
 
+TEST(EventLog, LinesAreWrittenWhileTheSimulatedClockStands) {
+  ros::Time::setNow(ros::Time());  // what use_sim_time without /clock gives
+  testing::internal::CaptureStderr();
+  EventLog log;
+  log.warn("waiting for the clock");
+  log.warn("waiting for the clock");
+  const std::string said = testing::internal::GetCapturedStderr();
+  ros::Time::init();
+  const std::size_t first = said.find("waiting for the clock");
+  ASSERT_NE(first, std::string::npos) << said;
+  EXPECT_EQ(said.find("waiting for the clock", first + 1), std::string::npos) << "throttled: " << said;
+}
+
 TEST(EventLog, LinesAreShortAndHaveNoControlCharacters) {
   EXPECT_EQ(log_line("a plain line"), "a plain line");
   EXPECT_EQ(log_line("two\nlines\x1b[31m"), "two?lines?[31m");

@@ -55,5 +55,31 @@ TEST(SensorFrames, AMissingOneIsSaidOnce) {
   EXPECT_THAT(node.said(), testing::ElementsAre(HasSubstr("antenna at x 1 m")));
 }
 
+TEST(SensorFrames, FramesOfTheOdometryThatAreOthersAreSaidOnce) {
+  Node node;
+  for (int k = 0; k < 3; ++k) node.frames.observe_odometry("wheel_odom", "base_footprint");
+  EXPECT_THAT(node.said(),
+              testing::ElementsAre(HasSubstr("header.frame_id is 'wheel_odom', odom_frame is 'odom'"),
+                                   HasSubstr("child_frame_id is 'base_footprint', base_link_frame is 'base_link'")));
+}
+
+TEST(SensorFrames, ALeadingSlashIsNoOtherFrame) {
+  Node node;
+  node.frames.observe_odometry("/odom", "/base_link");
+  EXPECT_THAT(node.said(), testing::IsEmpty());
+  node.frames.observe_fix("/antenna");
+  node.put_antenna_at(1.0, 0.0);
+  node.frames.look_up(node.tf, node.rig.pipeline);
+  EXPECT_THAT(node.said(), testing::ElementsAre(HasSubstr("antenna at x 1 m")));
+}
+
+TEST(SensorFrames, FixesWithoutAFrameAreSaidOnce) {
+  SensorFrames frames{Frames{}, true};
+  for (int k = 0; k < 20; ++k) frames.observe_fix("");
+  const std::vector<PipelineEvent> events = frames.take_events();
+  ASSERT_EQ(events.size(), 1u);
+  EXPECT_THAT(events[0].text, HasSubstr("fixes have no frame_id"));
+}
+
 }  // namespace
 }  // namespace urban_gnss

@@ -4,6 +4,7 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "urban_gnss_localization/localizers/bias_estimate.hpp"
@@ -20,6 +21,7 @@
 #include "urban_gnss_localization/pipeline/odometry_source.hpp"
 #include "urban_gnss_localization/pipeline/pipeline_event.hpp"
 #include "urban_gnss_localization/pipeline/rate_monitor.hpp"
+#include "urban_gnss_localization/pipeline/saved_state.hpp"
 #include "urban_gnss_localization/pipeline/start_supervisor.hpp"
 #include "urban_gnss_localization/pipeline/status_reporter.hpp"
 #include "urban_gnss_localization/pipeline/stream_offsets.hpp"
@@ -96,6 +98,13 @@ class LocalizationPipeline {
   /// initial_position_sigma and initial_heading_sigma. Throws std::invalid_argument where
   /// estimate_fault() finds a fault.
   void set_pose(const PoseEstimate& pose);
+  /// Starts where a former run was, with its datum, as soon as odometry says how old the state is. It is a pose that
+  /// was set. The state is left out, with an event that says why, where it is too old or of the future (age_fault()),
+  /// or the datum is another. A pose that is set before goes first. Requires no state_fault().
+  void restore(const SavedState& state, const SavedStateParameters& parameters);
+  /// What a later run can go on from, without names of frames. Nothing where that is not worth it: before the start,
+  /// without a heading, lost, or where no fix has confirmed the pose.
+  std::optional<SavedState> state() const;
   /// Sets the map frame's origin; the filter starts anew where it had another. Throws std::invalid_argument where there
   /// is no such place.
   void set_datum(const GeodeticPosition& datum);
@@ -152,6 +161,8 @@ class LocalizationPipeline {
   /// Why a message of the stream cannot be used, then.
   std::string far_ahead(InputStream stream) const;
   void forget_odometry(double gap_s);
+  /// Starts from the state that is to be restored, if it can be.
+  void start_from_state(Stamp now);
   /// Tells the localizer, unless it is as printed.
   void doubt_motion(const MotionDoubt& doubt);
   /// The odometry is moved by another part of its messages from now on.
@@ -231,6 +242,7 @@ class LocalizationPipeline {
   ResidualCheck residuals_;
   BiasMatcher biases_;
   StartSupervisor start_;
+  std::optional<std::pair<SavedState, SavedStateParameters>> saved_;  ///< to be restored at the first odometry
   IntegrityMonitor integrity_;
   StatusReporter reporter_;
 

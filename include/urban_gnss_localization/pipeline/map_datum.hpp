@@ -19,9 +19,9 @@ class MapDatum {
 
   /// Takes a fix into account while there is no datum.
   void add(const RawFix& fix);
-  /// Sets the datum. Returns whether the frame is another one than before. Throws
-  /// std::invalid_argument where there is no such place.
-  bool set(const GeodeticPosition& datum);
+  /// Sets the datum, which comes from `source`, for people. Returns whether the frame is another one than before.
+  /// Throws std::invalid_argument where there is no such place.
+  bool set(const GeodeticPosition& datum, const std::string& source = "request");
 
   /// Where it is and comes from, for people. Requires a datum.
   std::string describe() const;

@@ -13,6 +13,11 @@
 
 namespace urban_gnss {
 
+/// Nothing that is no number goes on. A fix without a finite place is none; an altitude, an angle, a C/N0 or a residual
+/// that is not finite is unknown; a covariance that is none (covariance_fault()) is not declared; a velocity that is not
+/// finite is left out.
+void make_sound(ReceiverOutput& output);
+
 /// What came of a receiver's messages.
 struct ReceiverCounts {
   std::size_t fixes{0};     ///< with a position

@@ -25,6 +25,7 @@
 #include "urban_gnss_localization/ros/map_services.hpp"
 #include "urban_gnss_localization/ros/node_shell.hpp"
 #include "urban_gnss_localization/ros/sensor_frames.hpp"
+#include "urban_gnss_localization/ros/state_keeper.hpp"
 #include "urban_gnss_localization/ros/transform_input.hpp"
 
 namespace urban_gnss {
@@ -36,6 +37,7 @@ struct LocalizerNodeParameters {
   double transform_time_offset{0.0};
   CorrectionSlewParameters slew;
   bool antenna_offset_from_tf{true};
+  SavedStateParameters state;
   LocalizationParameters localization;
 
   /// Whether the antenna's place is looked up in tf.
@@ -49,6 +51,7 @@ struct LocalizerNodeParameters {
     v.include(slew);
     v("antenna_offset_from_tf", antenna_offset_from_tf,
       "whether antenna_offset is taken from tf (base_link -> the fix's frame_id) where it is [0, 0]");
+    v.group("state", state, "What is believed of ~state_file, where that is set.");
     v.include(localization);
   }
 };
@@ -58,7 +61,7 @@ struct LocalizerNodeParameters {
 ///
 /// Subscribes odom, gps/fix, initialpose, gps/datum; gps/bias, gps/velocity and gps/satellites where the filter wants
 /// them; imu/data where use_imu_yaw_rate is set. Publishes odometry/filtered and gps/filtered, tf map -> odom, ~status,
-/// and gps/datum (latched) where it found the datum itself. Services set_pose, datum, toLL, fromLL, toLLArray,
+/// and gps/datum (latched) where it found the datum itself. ~state_file: StateKeeper. Services set_pose, datum, toLL, fromLL, toLLArray,
 /// fromLLArray, ~reset.
 class LocalizerNode {
  public:
@@ -119,6 +122,7 @@ class LocalizerNode {
   ros::Publisher datum_publisher_;
   std::vector<ros::Subscriber> subscribers_;
   std::vector<ros::ServiceServer> services_;
+  StateKeeper state_;
   InputWatch odometry_watch_{log_};
   InputWatch fix_watch_{log_};
   tf2_ros::TransformBroadcaster broadcaster_;

@@ -41,6 +41,7 @@ class OcclusionNode {
   void on_imu(const sensor_msgs::Imu& message);
   void on_fix(const sensor_msgs::NavSatFixConstPtr& message);
   void subscribe(ros::NodeHandle& node, bool takes_imu);
+  void settle_fixes();
   void work();
   void every_second();
   void every_five_seconds();
@@ -75,6 +76,7 @@ class OcclusionNode {
   ros::Subscriber imu_subscriber_;
   ros::ServiceServer clear_service_;
   ros::ServiceServer save_service_;
+  ros::WallTimer fix_timer_;
   ros::WallTimer work_timer_;
   ros::WallTimer second_timer_;
   ros::WallTimer five_second_timer_;

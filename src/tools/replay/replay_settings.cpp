@@ -118,6 +118,7 @@ ReplaySettings read_settings(const ReplayOptions& options, const LocalizerRegist
 
   // Of the live nodes alone.
   for (YAML::Node map : {maps.of_localizer, maps.of_gps_bias}) map.remove("diagnostic_period");
+  maps.of_localizer.remove(kStateFile);
 
   std::vector<std::string> faults = read_tiered(maps.of_localizer, "", settings.localizer);
   // What both nodes are told alike is told once: to the localizer.
