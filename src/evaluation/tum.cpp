@@ -38,13 +38,16 @@ TimedPose parse_line(const std::string& line) {
   }
   if (words >> word) throw std::runtime_error("more than eight numbers");
 
-  const auto [x, y, z, qx, qy, qz, qw] = numbers;
-  const double norm_squared = qx * qx + qy * qy + qz * qz + qw * qw;
-  if (!(norm_squared > 0.0)) throw std::runtime_error("the quaternion is zero");
+  const Eigen::Vector4d written(numbers[3], numbers[4], numbers[5], numbers[6]);
+  const double largest = written.cwiseAbs().maxCoeff();
+  if (!(largest > 0.0)) throw std::runtime_error("the quaternion is zero");
+  // Not normalised, for the angle is homogeneous in it. A power of two keeps the squares within what a number can be.
+  const int exponent = std::ilogb(largest);
+  const Eigen::Vector4d q = written.unaryExpr([&](double part) { return std::scalbn(part, -exponent); });
   TimedPose pose;
   pose.stamp = *stamp;
-  // Homogeneous in the quaternion, so that one written with few decimals needs no normalising.
-  pose.pose = {x, y, std::atan2(2.0 * (qw * qz + qx * qy), qw * qw + qx * qx - qy * qy - qz * qz)};
+  pose.pose = {numbers[0], numbers[1],
+               std::atan2(2.0 * (q[3] * q[2] + q[0] * q[1]), q[3] * q[3] + q[0] * q[0] - q[1] * q[1] - q[2] * q[2])};
   return pose;
 }
 

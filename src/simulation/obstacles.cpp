@@ -6,6 +6,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "urban_gnss_localization/simulation/world.hpp"
+
 namespace urban_gnss {
 namespace {
 
@@ -42,6 +44,8 @@ Car::Car(const CarParameters& parameters) : parameters_(parameters) {
   double travelled = 0.0;
   for (std::size_t i = 0; i < p.loop.size(); ++i) {
     if (!p.loop[i].allFinite()) throw std::invalid_argument("car: the loop's points must be finite");
+    if (!is_in_world(p.loop[i]))
+      throw std::invalid_argument("car: the loop leaves the world of 100 km about the origin");
     travelled += (p.loop[(i + 1) % p.loop.size()] - p.loop[i]).norm();
     leg_ends_m_.push_back(travelled);
   }

@@ -11,6 +11,8 @@
 #include <cmath>
 #include <sstream>
 
+#include "urban_gnss_localization/simulation/world.hpp"
+
 namespace urban_gnss {
 namespace {
 
@@ -75,6 +77,7 @@ std::string polygon_fault(const Polygon& polygon) {
   if (polygon.size() < 3) return "needs at least 3 corners, has " + std::to_string(polygon.size());
   for (const Eigen::Vector2d& corner : polygon) {
     if (!corner.allFinite()) return "corner " + text(corner) + " is not finite";
+    if (!is_in_world(corner)) return "corner " + text(corner) + " is more than 100 km from the origin";
   }
   for (std::size_t i = 0; i < polygon.size(); ++i) {
     for (std::size_t j = i + 1; j < polygon.size(); ++j) {

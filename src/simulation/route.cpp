@@ -6,10 +6,13 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "urban_gnss_localization/simulation/world.hpp"
+
 namespace urban_gnss {
 namespace {
 
 constexpr double kSamePlace_m = 1e-6;
+constexpr double kLongest_m = 1e6;
 
 bool is_same_place(const Eigen::Vector2d& a, const Eigen::Vector2d& b) { return (a - b).norm() < kSamePlace_m; }
 
@@ -66,9 +69,11 @@ void require_drivable(const Route& route) {
     const RouteWaypoint& waypoint = route.waypoints[i];
     const std::string name = "waypoint " + std::to_string(i) + ": ";
     if (!waypoint.position.allFinite()) refuse(name + "the position must be finite");
+    if (!is_in_world(waypoint.position)) refuse(name + "the position is more than 100 km from the origin");
     if (!(waypoint.speed_mps > 0.0 && std::isfinite(waypoint.speed_mps))) refuse(name + "the speed must be > 0");
     if (!(waypoint.stop_s >= 0.0 && std::isfinite(waypoint.stop_s))) refuse(name + "the stop must be >= 0");
   }
+  if (route.length_m() > kLongest_m) refuse("is longer than 1000 km");
   for (const RouteWaypoint& waypoint : route.waypoints) {
     if (!is_same_place(waypoint.position, route.waypoints.front().position)) return;
   }

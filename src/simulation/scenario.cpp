@@ -38,6 +38,9 @@ struct Header {
       for (const auto& fault : position_faults({datum[0], datum[1], datum[2]})) faults.push_back("datum: " + fault);
     }
     if (!start.empty() && start.size() != 3) faults.push_back("start: must be x (m), y (m) and yaw (rad)");
+    if (start.size() == 3 && !is_in_world({start[0], start[1]})) {
+      faults.push_back("start: is more than 100 km from the origin");
+    }
     try {
       parse_utc(start_time);
     } catch (const std::invalid_argument& error) {

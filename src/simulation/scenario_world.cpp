@@ -5,8 +5,8 @@
 #include <sstream>
 
 #include "scenario_nodes.hpp"
-#include "urban_gnss_localization/parameters/parameter_reader.hpp"
 #include "urban_gnss_localization/common/random.hpp"
+#include "urban_gnss_localization/parameters/parameter_reader.hpp"
 #include "urban_gnss_localization/simulation/polygon.hpp"
 
 namespace urban_gnss {
@@ -14,6 +14,11 @@ namespace {
 
 constexpr double kMostEntries = 100000.0;  ///< buildings of a grid, trees of a row: more is a slip of the pen
 constexpr double kHeadroom = 2.0;          ///< m: what begins higher stands in nobody's way
+
+/// Of coordinates and heights, and of lengths.
+const Range kPlace = between(-kWorldReach_m, kWorldReach_m);
+const Range kLength = open_between(0.0, kWorldReach_m);
+const Range kLengthOrNone = between(0.0, kWorldReach_m);
 
 /// What a building has besides its footprint. The names are those of the scenario.
 struct BuildingFields {
@@ -26,9 +31,9 @@ struct BuildingFields {
   void visit(ParameterVisitor& v) {
     if (has_own_roof) {
       v("name", name, "of the building");
-      v("roof", roof, any_number(), "m", "height of the roof above the ground");
+      v("roof", roof, kPlace, "m", "height of the roof above the ground");
     }
-    v("base", base, any_number(), "m", "height at which it begins");
+    v("base", base, kPlace, "m", "height at which it begins");
     v("reflection_loss", reflection_loss, non_negative(), "dB", "that a reflection costs");
   }
   void check(std::vector<std::string>& faults) const {
@@ -44,10 +49,10 @@ struct TreeFields {
   double attenuation{Tree().attenuation_db_per_m};
 
   void visit(ParameterVisitor& v) {
-    v("trunk_radius", trunk_radius, non_negative(), "m", "of the trunk");
-    v("crown_radius", crown_radius, non_negative(), "m", "of the crown");
-    v("crown_base", crown_base, non_negative(), "m", "height at which the crown begins");
-    v("crown_top", crown_top, positive(), "m", "height at which it ends");
+    v("trunk_radius", trunk_radius, kLengthOrNone, "m", "of the trunk");
+    v("crown_radius", crown_radius, kLengthOrNone, "m", "of the crown");
+    v("crown_base", crown_base, kLengthOrNone, "m", "height at which the crown begins");
+    v("crown_top", crown_top, kLength, "m", "height at which it ends");
     v("attenuation", attenuation, non_negative(), "dB/m", "of a signal through the crown");
   }
   void check(std::vector<std::string>& faults) const {
@@ -146,13 +151,17 @@ Polygon read_box(Entry& entry) {
   Eigen::Vector2d center = Eigen::Vector2d::Zero();
   Eigen::Vector2d size = Eigen::Vector2d::Ones();
   double yaw = 0.0;
-  read_pair(box, "center", Need::kRequired, any_number(), center);
-  read_pair(box, "size", Need::kRequired, positive(), size);
+  read_pair(box, "center", Need::kRequired, kPlace, center);
+  read_pair(box, "size", Need::kRequired, kLength, size);
   box("yaw", yaw, any_number(), "rad", "counter-clockwise from east");
   entry.add(box.finish());
   const Eigen::Vector2d along = 0.5 * size.x() * Eigen::Vector2d(std::cos(yaw), std::sin(yaw));
   const Eigen::Vector2d across = 0.5 * size.y() * Eigen::Vector2d(-std::sin(yaw), std::cos(yaw));
-  return {center - along - across, center + along - across, center + along + across, center - along + across};
+  const Polygon footprint{center - along - across, center + along - across, center + along + across,
+                          center - along + across};
+  const std::string fault = polygon_fault(footprint);
+  if (!fault.empty() && entry.faults.empty()) entry.reader.fault("box", fault);
+  return footprint;
 }
 
 void read_plazas(ParameterReader& reader, BlockGrid& grid) {
@@ -179,15 +188,15 @@ std::vector<Building> read_grid(Entry& entry, const BuildingFields& fields) {
   ParameterReader reader = entry.section("grid");
   BlockGrid grid;
   const auto optional = Need::kOptional;
-  read_pair(reader, "origin", optional, any_number(), grid.origin);
+  read_pair(reader, "origin", optional, kPlace, grid.origin);
   const bool has_blocks = read_whole_pair(reader, "blocks", between(1.0, kMostEntries), grid.blocks);
-  read_pair(reader, "block_size", optional, positive(), grid.block_size);
-  read_pair(reader, "street_width", optional, non_negative(), grid.street_width);
+  read_pair(reader, "block_size", optional, kLength, grid.block_size);
+  read_pair(reader, "street_width", optional, kLengthOrNone, grid.street_width);
   reader("buildings_per_side", grid.buildings_per_side, between(1.0, 100.0), "", "of a block");
   int seed = static_cast<int>(grid.seed);
   reader("seed", seed, non_negative(), "", "of the heights");
   grid.seed = static_cast<std::uint64_t>(seed);
-  const bool has_heights = read_pair(reader, "heights", optional, positive(), grid.heights);
+  const bool has_heights = read_pair(reader, "heights", optional, kLength, grid.heights);
   if (has_heights && grid.heights.x() > grid.heights.y()) reader.fault("heights", "must be [lowest, highest]");
   if (has_heights && !(grid.heights.x() > fields.base)) reader.fault("heights", "must be higher than base");
   if (has_blocks) read_plazas(reader, grid);
@@ -195,7 +204,15 @@ std::vector<Building> read_grid(Entry& entry, const BuildingFields& fields) {
   if (count > kMostEntries) reader.fault("blocks", "makes more than 100000 buildings");
   const std::vector<std::string> faults = reader.finish();
   entry.add(faults);
-  return faults.empty() ? make_blocks(grid) : std::vector<Building>();
+  if (!faults.empty()) return {};
+  std::vector<Building> buildings = make_blocks(grid);
+  if (buildings.empty()) return buildings;
+  // All are of one size, and the last is the farthest.
+  for (const Building& building : {buildings.front(), buildings.back()}) {
+    const std::string fault = polygon_fault(building.footprint);
+    if (!fault.empty()) entry.reader.fault("grid", "building " + building.name + ": " + fault);
+  }
+  return buildings;
 }
 
 std::vector<Building> read_table(Entry& entry, const BuildingFields& fields) {
@@ -254,8 +271,8 @@ std::vector<Eigen::Vector2d> read_row(Entry& entry) {
   Eigen::Vector2d from = Eigen::Vector2d::Zero();
   Eigen::Vector2d to = Eigen::Vector2d::Zero();
   double spacing = 8.0;
-  read_pair(row, "from", Need::kRequired, any_number(), from);
-  read_pair(row, "to", Need::kRequired, any_number(), to);
+  read_pair(row, "from", Need::kRequired, kPlace, from);
+  read_pair(row, "to", Need::kRequired, kPlace, to);
   row("spacing", spacing, positive(), "m", "from trunk to trunk");
   const double length = (to - from).norm();
   // The last tree stands at `to` where the spacing divides the length, whatever the rounding.
@@ -281,7 +298,7 @@ void read_tree(Entry& entry, std::vector<Tree>& trees) {
   } else if (entry.reader.has("row")) {
     positions = read_row(entry);
   } else {
-    read_pair(entry.reader, "position", Need::kRequired, any_number(), positions[0]);
+    read_pair(entry.reader, "position", Need::kRequired, kPlace, positions[0]);
   }
   if (!entry.finish().empty()) return;
   for (const Eigen::Vector2d& position : positions) {

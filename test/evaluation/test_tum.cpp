@@ -131,6 +131,13 @@ TEST(Tum, ReadsOthersFiles) {
   EXPECT_NEAR(trajectory[1].pose.yaw, -0.5 * kPi, 1e-12);
 }
 
+TEST(Tum, TakesAQuaternionOfAnyLength) {
+  for (const char* length : {"1e200", "1e-200", "1.7e308", "5e-324"}) {
+    std::istringstream in("1 0 0 0 0 0 " + std::string(length) + " " + length + "\n");
+    EXPECT_NEAR(read_tum(in).at(0).pose.yaw, 0.5 * kPi, 1e-12) << length;
+  }
+}
+
 TEST(Tum, NamesTheFaultyLine) {
   EXPECT_EQ(error_of("# comment\n1 0 0 0 0 0 0\n"), "line 2: fewer than eight numbers");
   EXPECT_EQ(error_of("1 0 0 0 0 0 0 1 7\n"), "line 1: more than eight numbers");

@@ -64,6 +64,7 @@ inline const Connection kGpgsv = {
     "Header header\nstring message_id\nuint8 n_msgs\nuint8 msg_number\nuint8 n_satellites\nSatellite[] satellites\n" +
         kHeaderDefinition + kBetween +
         "MSG: novatel_gps_msgs/Satellite\nuint8 prn\nuint8 elevation\nuint16 azimuth\nint8 snr\n"};
+inline const Connection kSentence = {"nmea_msgs/Sentence", "Header header\nstring sentence\n" + kHeaderDefinition};
 
 /// 2018-03-29 17:23:27 UTC and its time of week, as in a real recording.
 constexpr std::uint32_t kSecond = 1522344207;

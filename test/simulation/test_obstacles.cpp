@@ -61,8 +61,10 @@ TEST(Obstacles, UnusableCarsAreRefused) {
   bad.loop.clear();
   EXPECT_THROW(Car{bad}, std::invalid_argument);
   bad = good;
-  bad.loop[0].x() = kInfinity;
-  EXPECT_THROW(Car{bad}, std::invalid_argument);
+  for (const double far_m : {kInfinity, 2e5}) {
+    bad.loop[0].x() = far_m;
+    EXPECT_THROW(Car{bad}, std::invalid_argument);
+  }
   bad = good;
   bad.speed_mps = kInfinity;
   EXPECT_THROW(Car{bad}, std::invalid_argument);

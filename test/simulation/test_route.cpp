@@ -86,9 +86,14 @@ TEST(Route, StartLooksAtTheNextPlace) {
 TEST(Route, WhatCannotBeDrivenIsRefused) {
   EXPECT_NO_THROW(require_drivable(grid(true)));
   EXPECT_THROW(require_drivable({}), std::invalid_argument);
+  std::vector<Eigen::Vector2d> long_way;
+  for (int i = 0; i < 13; ++i) long_way.emplace_back(i % 2 == 0 ? 0.0 : 9e4, i);
+  EXPECT_NO_THROW(require_drivable(route_through({long_way.begin(), long_way.end() - 1})));
+  EXPECT_THROW(require_drivable(route_through({long_way.begin(), long_way.end()})), std::invalid_argument);
   EXPECT_THROW(require_drivable(route_through({{1, 1}})), std::invalid_argument);
   EXPECT_THROW(require_drivable(route_through({{1, 1}, {1, 1}})), std::invalid_argument);
   EXPECT_THROW(RouteFollower(route_through({{1, 1}, {kNaN, 1}})), std::invalid_argument);
+  EXPECT_THROW(RouteFollower(route_through({{1, 1}, {1e11, 1}})), std::invalid_argument);
   EXPECT_THROW(RouteFollower(route_through({{1, 1}, {2, 1}}, 0.0)), std::invalid_argument);
   EXPECT_THROW(RouteFollower(route_through({{1, 1}, {2, 1}}, kNaN)), std::invalid_argument);
   Route route = grid(false);

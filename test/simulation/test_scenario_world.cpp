@@ -121,6 +121,8 @@ TEST(Polygon, FaultsHaveTheirReason) {
   EXPECT_EQ(polygon_fault({{0, 0}, {1, 0}, {1, 1}, {1, 0}}), "corner (1, 0) is repeated");
   EXPECT_EQ(polygon_fault({{0, 0}, {1, 0}, {1, 1}, {0, 0}}), "corner (0, 0) is repeated (do not close the polygon)");
   EXPECT_EQ(polygon_fault({{0, 0}, {1, 0}, {1, NAN}}), "corner (1, nan) is not finite");
+  EXPECT_EQ(polygon_fault({{0, 0}, {1e5, 0}, {1e5, 1e5}}), "");
+  EXPECT_EQ(polygon_fault({{0, 0}, {-1e308, 0}, {1, 1}}), "corner (-1e+308, 0) is more than 100 km from the origin");
   EXPECT_EQ(polygon_fault({{0, 0}, {4, 4}, {4, 0}, {0, 4}}), "not a simple polygon (sides cross or overlap)");
   const std::string crossed = polygon_fault({{0, 0}, {4, 4}, {4, 0}, {-1, 5}});
   EXPECT_TRUE(has(crossed, "self-intersection point was found at (2, 2)")) << crossed;
@@ -248,8 +250,11 @@ TEST(ScenarioWorld, FaultsOfBuildingsHaveFileAndLine) {
 TEST(ScenarioWorld, FaultsOfBoxesAndGrids) {
   EXPECT_EQ(fault("buildings: [{box: {center: [0, 0]}, roof: 3}]"), "city.yaml:1: buildings[0].box.size: is missing");
   EXPECT_EQ(fault("buildings: [{box: {center: [0, 0], size: [1, 0]}, roof: 3}]"),
-            "city.yaml:1: buildings[0].box.size: both must be a finite number greater than 0");
+            "city.yaml:1: buildings[0].box.size: both must be greater than 0 and at most 100000");
   EXPECT_TRUE(has(fault("buildings: [{box: {center: [0, 0], size: [1, 1], jaw: 2}, roof: 3}]"), "did you mean yaw?"));
+  EXPECT_EQ(fault("buildings: [{box: {center: [1e308, 0], size: [1, 1]}, roof: 3}]"),
+            "city.yaml:1: buildings[0].box.center: both must be at least -100000 and at most 100000");
+  EXPECT_TRUE(has(fault("buildings: [{box: {center: [0, 0], size: [1, 1e-9]}, roof: 3}]"), "box: corner (0.5, "));
   EXPECT_EQ(fault("buildings: [{box: {center: [0, .nan], size: [1, 1]}, roof: 3}]"),
             "city.yaml:1: buildings[0].box.center: must be two finite numbers, [x, y]");
   const auto grid_fault = [](const std::string& fields) {
@@ -263,7 +268,8 @@ TEST(ScenarioWorld, FaultsOfBoxesAndGrids) {
   EXPECT_EQ(grid_fault("heights: [60, 30]"), "heights: must be [lowest, highest]");
   EXPECT_EQ(grid_fault("plazas: [[0, 0], [1, 0]]"), "plazas[1]: must be [i, j], a block of the grid, from 0");
   EXPECT_EQ(grid_fault("plazas: 3"), "plazas: must be a list of blocks, [[i, j], ...]");
-  EXPECT_EQ(grid_fault("block_size: [-1, 3]"), "block_size: both must be a finite number greater than 0");
+  EXPECT_EQ(grid_fault("block_size: [-1, 3]"), "block_size: both must be greater than 0 and at most 100000");
+  EXPECT_TRUE(has(fault("buildings: [{grid: {blocks: [2, 1], block_size: [9e4, 9]}}]"), "more than 100 km"));
   EXPECT_EQ(grid_fault("buildings_per_side: 0"), "buildings_per_side = 0: must be at least 1 and at most 100");
   EXPECT_EQ(fault("buildings: [{grid: {}, roof: 4}]"), "city.yaml:1: buildings[0].roof: no such parameter");
 }
@@ -280,6 +286,8 @@ TEST(ScenarioWorld, FaultsOfTrees) {
             "city.yaml:1: trees[0].row.spacing = 0: must be a finite number greater than 0");
   EXPECT_EQ(fault("trees: [{row: {from: [0, 0], to: [1, 1], spacing: 1e-300}}]"),
             "city.yaml:1: trees[0].row.spacing: makes more than 100000 trees");
+  EXPECT_EQ(fault("trees: [{position: [0, 2e5]}]"),
+            "city.yaml:1: trees[0].position: both must be at least -100000 and at most 100000");
 }
 
 TEST(ScenarioWorld, EveryBadEntryIsReportedAndTheGoodOnesStay) {

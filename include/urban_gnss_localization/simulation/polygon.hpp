@@ -22,8 +22,8 @@ bool contains(const Polygon& polygon, const Eigen::Vector2d& point);
 /// The smallest convex polygon around the points (m), counter-clockwise. Empty without points.
 Polygon convex_hull(const std::vector<Eigen::Vector2d>& points);
 
-/// Why the corners, in either orientation, make no footprint: too few, not finite, repeated, without an area, or sides
-/// that cross or touch each other. Empty where they do make one.
+/// Why the corners, in either orientation, make no footprint: too few, not finite, too far, repeated, without an area,
+/// or sides that cross or touch each other. Empty where they do make one.
 std::string polygon_fault(const Polygon& polygon);
 
 }  // namespace urban_gnss

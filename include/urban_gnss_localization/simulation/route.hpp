@@ -28,7 +28,8 @@ struct Route {
 };
 
 /// Throws std::invalid_argument with the fault where a route cannot be driven: fewer than two different positions,
-/// something not finite, a speed that is not positive, a stop that is negative.
+/// something not finite, a position out of the world, more than 1000 km, a speed that is not positive, a stop that is
+/// negative.
 void require_drivable(const Route& route);
 
 /// How a recorded track becomes a route.

@@ -6,6 +6,11 @@
 
 namespace urban_gnss {
 
+/// m: what is placed is nearer to the origin, along each axis. The map frame is flat, and the Earth is not.
+inline constexpr double kWorldReach_m = 1e5;
+
+inline bool is_in_world(const Eigen::Vector2d& point) { return (point.array().abs() <= kWorldReach_m).all(); }
+
 /// An extruded footprint. A building stands on the ground; a bridge or the roof of a tunnel has a base above it.
 struct Building {
   std::string name;
