@@ -34,7 +34,7 @@ ParticleSet cloud(std::size_t count) {
   start.covariance = Eigen::Vector3d(0.09, 0.09, 0.0025).asDiagonal();
   ParticleSet particles(count);
   particles.draw_gaussian(start, engine);
-  for (double& lw : particles.log_weight) lw = 2.0 * draw_normal(engine);
+  for (float& lw : particles.log_weight) lw = static_cast<float>(2.0 * draw_normal(engine));
   particles.normalise();
   return particles;
 }
@@ -69,7 +69,7 @@ void BM_PaperStep(benchmark::State& state) {
   parameters.fix = known_sigmas();
   run_steps<ParticleFilter>(state, parameters);
 }
-BENCHMARK(BM_PaperStep)->Arg(1000)->Arg(10000)->Unit(benchmark::kMicrosecond);
+BENCHMARK(BM_PaperStep)->Arg(1000)->Arg(10000)->Arg(100000)->Unit(benchmark::kMicrosecond);
 
 /// With as many particles as are plausible.
 void BM_SwitchingStep(benchmark::State& state) {
@@ -112,7 +112,7 @@ void BM_SampleMotion(benchmark::State& state) {
   ParticleSet particles = cloud(static_cast<std::size_t>(state.range(0)));
   const MotionStep step = make_motion_step(kTwist, kStep_s, paper_motion(static_cast<MotionModel>(state.range(1))));
   RandomEngine engine = make_engine(2);
-  for (auto _ : state) sample_motion(particles, step, engine);
+  for (auto _ : state) sample_motion(particles, step, RandomStream(engine()));
   state.SetLabel(enum_name(step.model));
   count_particles(state);
 }
@@ -127,10 +127,7 @@ void BM_MoveNoisilyLoop(benchmark::State& state) {
   RandomEngine engine = make_engine(2);
   for (auto _ : state) {
     for (std::size_t i = 0; i < particles.size(); ++i) {
-      const Pose2 moved = move_noisily(particles.pose(i), step, draw_motion_noise(engine));
-      particles.x[i] = moved.x;
-      particles.y[i] = moved.y;
-      particles.yaw[i] = moved.yaw;
+      particles.set_pose(i, move_noisily(particles.pose(i), step, draw_motion_noise(engine)));
     }
   }
   state.SetLabel(enum_name(step.model));
@@ -138,6 +135,34 @@ void BM_MoveNoisilyLoop(benchmark::State& state) {
 }
 BENCHMARK(BM_MoveNoisilyLoop)
     ->ArgsProduct({{1000, 10000}, {int(MotionModel::kBicycle), int(MotionModel::kVelocity)}})
+    ->Unit(benchmark::kMicrosecond);
+
+/// What predicts and weighs: the motion's noise, the likelihood of the paper mode, weights that sum to 1.
+FixLikelihood shadowed_fix() {
+  FixLikelihood fix;
+  fix.fix = {2.0, 0.0};
+  fix.radius = 2.0;
+  fix.direct_covariance *= 0.0025;
+  fix.shadow_sigma = 0.316;
+  return fix;
+}
+
+void BM_PredictAndWeigh(benchmark::State& state) {
+  ParticleSet particles = cloud(static_cast<std::size_t>(state.range(0)));
+  const MotionStep step = make_motion_step(kTwist, kStep_s, paper_motion(static_cast<MotionModel>(state.range(1))));
+  const FixLikelihood fix = shadowed_fix();
+  RandomEngine engine = make_engine(2);
+  for (auto _ : state) {
+    sample_motion(particles, step, RandomStream(engine()));
+    weigh(particles, fix);
+    particles.normalise();
+    benchmark::DoNotOptimize(particles.weight.data());
+  }
+  state.SetLabel(enum_name(step.model));
+  count_particles(state);
+}
+BENCHMARK(BM_PredictAndWeigh)
+    ->ArgsProduct({{1000, 10000, 100000, 1000000}, {int(MotionModel::kBicycle), int(MotionModel::kVelocity)}})
     ->Unit(benchmark::kMicrosecond);
 
 void BM_Weigh(benchmark::State& state) {
@@ -172,7 +197,7 @@ void BM_Clusters(benchmark::State& state) {
   }
   count_particles(state);
 }
-BENCHMARK(BM_Clusters)->Arg(1000)->Arg(10000)->Unit(benchmark::kMicrosecond);
+BENCHMARK(BM_Clusters)->Arg(1000)->Arg(10000)->Arg(100000)->Unit(benchmark::kMicrosecond);
 
 void BM_Resampling(benchmark::State& state) {
   const ParticleSet original = cloud(static_cast<std::size_t>(state.range(0)));
@@ -182,7 +207,7 @@ void BM_Resampling(benchmark::State& state) {
   RandomEngine engine = make_engine(3);
   for (auto _ : state) {
     particles.weight = original.weight;
-    resampler.resample(particles, engine);
+    resampler.resample(particles, RandomStream(engine()));
     benchmark::DoNotOptimize(particles.x.data());
   }
   state.SetLabel(enum_name(scheme));

@@ -353,11 +353,12 @@ sensor_msgs::PointCloud2 to_point_cloud(const ParticleSet& particles, const ros:
   const double scale = heaviest != particles.weight.end() && *heaviest > 0.0 ? 1.0 / *heaviest : 0.0;
   sensor_msgs::PointCloud2Iterator<float> x(message, "x");
   for (std::size_t i = 0; i < particles.size(); ++i, ++x) {
-    x[0] = static_cast<float>(particles.x[i]);
-    x[1] = static_cast<float>(particles.y[i]);
+    const Pose2 pose = particles.pose(i);
+    x[0] = static_cast<float>(pose.x);
+    x[1] = static_cast<float>(pose.y);
     x[2] = 0.0F;
-    x[3] = static_cast<float>(particles.yaw[i]);
-    x[4] = static_cast<float>(particles.weight[i]);
+    x[3] = static_cast<float>(pose.yaw);
+    x[4] = particles.weight[i];
     x[5] = static_cast<float>(particles.weight[i] * scale);
   }
   return message;

@@ -16,8 +16,8 @@
 #include <thread>
 
 #include "command_line.hpp"
-#include "find_scenario.hpp"
 #include "files/output_file.hpp"
+#include "find_scenario.hpp"
 #include "parallel_jobs.hpp"
 #include "urban_gnss_localization/evaluation/report_json.hpp"
 #include "urban_gnss_localization/evaluation/statistics.hpp"
@@ -129,8 +129,8 @@ class TraceWriter {
       snapshots_ << next_ << ',' << s.time_s << ',';
       poses(snapshots_) << s.radius_m << '\n';
       for (std::size_t i = 0; i < particles->size(); ++i) {
-        particles_ << next_ << ',' << particles->x[i] << ',' << particles->y[i] << ',' << particles->yaw[i] << ','
-                   << particles->weight[i] << '\n';
+        const Pose2 pose = particles->pose(i);
+        particles_ << next_ << ',' << pose.x << ',' << pose.y << ',' << pose.yaw << ',' << particles->weight[i] << '\n';
       }
       ++next_;
     }
@@ -354,7 +354,9 @@ void run_all(const Options& options, const std::string& command, const InputFile
 int main(int argc, char** argv) {
   Options options;
   options.methods = {"paper", "conventional", "literal", "dead_reckoning", "oracle"};
-  CommandLine line("paper_experiment", "Monte Carlo of the simulation of Nishida et al. (2013), section 4: every method on the same noise.");
+  CommandLine line(
+      "paper_experiment",
+      "Monte Carlo of the simulation of Nishida et al. (2013), section 4: every method on the same noise.");
   CLI::App& app = line.app();
   line.add_seeds(options.seeds, options.first_seed);
   app.add_option("--laps", options.laps, "rounds over the eight targets")->check(CLI::PositiveNumber);

@@ -11,6 +11,8 @@
 namespace urban_gnss {
 namespace {
 
+constexpr double kFloats = 1e-6;  ///< some roundings of places of metres, angles and weights
+
 /// Particles in a disc of 1 m about a place, all with the same yaw.
 void add_blob(ParticleSet& particles, std::size_t begin, std::size_t end, const Pose2& centre, RandomEngine& engine) {
   for (std::size_t i = begin; i < end; ++i) {
@@ -38,12 +40,12 @@ ParticleSet permuted(const ParticleSet& particles) {
 TEST(Estimation, MeanAngleIsTakenOnTheCircle) {
   ParticleSet particles(2);
   particles.yaw = {kPi - 0.1, -kPi + 0.3};
-  EXPECT_NEAR(std::abs(angle_difference(circular_mean(particles).yaw, -kPi + 0.1)), 0.0, 1e-14);
-  EXPECT_NEAR(arithmetic_mean(particles).yaw, 0.1, 1e-14);  // eq. (35) to the letter: the opposite direction
+  EXPECT_NEAR(std::abs(angle_difference(circular_mean(particles).yaw, -kPi + 0.1)), 0.0, kFloats);
+  EXPECT_NEAR(arithmetic_mean(particles).yaw, 0.1, kFloats);  // eq. (35) to the letter: the opposite direction
   set_weights(particles, {3.0, 1.0});
   const double sine = 0.75 * std::sin(kPi - 0.1) + 0.25 * std::sin(-kPi + 0.3);
   const double cosine = 0.75 * std::cos(kPi - 0.1) + 0.25 * std::cos(-kPi + 0.3);
-  EXPECT_NEAR(circular_mean(particles).yaw, std::atan2(sine, cosine), 1e-14);
+  EXPECT_NEAR(circular_mean(particles).yaw, std::atan2(sine, cosine), kFloats);
 }
 
 TEST(Estimation, MeanAndCovarianceAreTheWeightedOnes) {
@@ -52,14 +54,14 @@ TEST(Estimation, MeanAndCovarianceAreTheWeightedOnes) {
   particles.y = {1.0, 1.0, 5.0};
   particles.yaw = {3.0, -3.0, 3.1};
   set_weights(particles, {1.0, 2.0, 1.0});
-  EXPECT_NEAR(circular_mean(particles).x, 4.5, 1e-14);
-  EXPECT_NEAR(circular_mean(particles).y, 2.0, 1e-14);
+  EXPECT_NEAR(circular_mean(particles).x, 4.5, kFloats);
+  EXPECT_NEAR(circular_mean(particles).y, 2.0, kFloats);
   const Eigen::Matrix3d covariance = covariance_about(particles, {4.5, 2.0, kPi});
-  EXPECT_NEAR(covariance(0, 0), (4.5 * 4.5 + 2 * 0.5 * 0.5 + 5.5 * 5.5) / 4.0, 1e-13);
-  EXPECT_NEAR(covariance(0, 1), (4.5 + 2 * 0.5 + 5.5 * 3.0) / 4.0, 1e-13);
+  EXPECT_NEAR(covariance(0, 0), (4.5 * 4.5 + 2 * 0.5 * 0.5 + 5.5 * 5.5) / 4.0, kFloats);
+  EXPECT_NEAR(covariance(0, 1), (4.5 + 2 * 0.5 + 5.5 * 3.0) / 4.0, kFloats);
   const double a = 3.0 - kPi, b = kPi - 3.0, c = 3.1 - kPi;
-  EXPECT_NEAR(covariance(2, 2), (a * a + 2.0 * b * b + c * c) / 4.0, 1e-13);
-  EXPECT_NEAR(covariance(0, 2), (-4.5 * a - 2 * 0.5 * b + 5.5 * c) / 4.0, 1e-13);
+  EXPECT_NEAR(covariance(2, 2), (a * a + 2.0 * b * b + c * c) / 4.0, kFloats);
+  EXPECT_NEAR(covariance(0, 2), (-4.5 * a - 2 * 0.5 * b + 5.5 * c) / 4.0, kFloats);
   EXPECT_EQ(covariance, covariance.transpose());
 }
 
@@ -67,7 +69,7 @@ TEST(Estimation, CircularSigmaIsThatOfAWrappedGaussian) {
   RandomEngine engine = make_engine(1);
   for (const double sigma : {0.01, 0.3, 1.0}) {
     ParticleSet particles(50000);
-    for (double& yaw : particles.yaw) yaw = wrap_angle(3.0 + sigma * draw_normal(engine));
+    for (float& yaw : particles.yaw) yaw = wrap_angle(3.0 + sigma * draw_normal(engine));
     // The resultant R = exp(-sigma^2/2) is the mean of n cosines: 4.5 of its standard deviations, through -2 ln R.
     const double resultant = std::exp(-0.5 * sigma * sigma);
     const double cosine_variance = 0.5 * (1.0 + std::exp(-2.0 * sigma * sigma)) - resultant * resultant;
@@ -76,7 +78,7 @@ TEST(Estimation, CircularSigmaIsThatOfAWrappedGaussian) {
   }
   ParticleSet opposite(4);
   opposite.yaw = {0.0, kPi / 2.0, -kPi, -kPi / 2.0};
-  EXPECT_GT(circular_sigma(opposite), 8.0);  // R is nothing but rounding
+  EXPECT_GT(circular_sigma(opposite), 5.0);  // R is nothing but rounding of floats
   ParticleSet same(10);
   EXPECT_EQ(circular_sigma(same), 0.0);
 }
@@ -84,7 +86,7 @@ TEST(Estimation, CircularSigmaIsThatOfAWrappedGaussian) {
 TEST(Estimation, EffectiveSampleSizeLiesBetweenOneAndAllEq39) {
   RandomEngine engine = make_engine(2);
   ParticleSet equal(1000);
-  EXPECT_NEAR(effective_sample_size(equal), 1000.0, 1e-9);
+  EXPECT_NEAR(effective_sample_size(equal), 1000.0, 1e-3);  // of a weight of 6e-8
   ParticleSet one(1000);
   set_weights(one, std::vector<double>(1000, 0.0));
   one.log_weight.assign(1000, -1e9);
@@ -95,7 +97,7 @@ TEST(Estimation, EffectiveSampleSizeLiesBetweenOneAndAllEq39) {
   std::vector<double> weights(1000, 0.0);
   std::fill(weights.begin(), weights.begin() + 500, 2.0);
   set_weights(half, weights);
-  EXPECT_NEAR(effective_sample_size(half), 500.0, 1e-9);
+  EXPECT_NEAR(effective_sample_size(half), 500.0, 1e-3);
   const double random = effective_sample_size(random_particles(1000, engine));
   EXPECT_GT(random, 1.0);
   EXPECT_LT(random, 999.0);
@@ -131,7 +133,7 @@ TEST(Clusters, HeavierOfTwoBlobsIsTheEstimate) {
   ParticleClusters clusters(1000, 1.0);
   clusters.find(particles);
   EXPECT_EQ(clusters.count(), 2u);
-  EXPECT_NEAR(clusters.heaviest_mass(), 0.7, 1e-12);
+  EXPECT_NEAR(clusters.heaviest_mass(), 0.7, kFloats);
   // The mean of 700 points of a unit disc has sigma 0.5 / sqrt(700) = 0.019 per axis.
   EXPECT_TRUE(near(clusters.heaviest_mean(particles), {-20.0, 3.0, kPi - 0.01}, 0.085));
 
@@ -140,7 +142,7 @@ TEST(Clusters, HeavierOfTwoBlobsIsTheEstimate) {
   std::fill(weights.begin(), weights.begin() + 300, 10.0);
   set_weights(particles, weights);
   clusters.find(particles);
-  EXPECT_NEAR(clusters.heaviest_mass(), 3000.0 / 3700.0, 1e-12);
+  EXPECT_NEAR(clusters.heaviest_mass(), 3000.0 / 3700.0, kFloats);
   EXPECT_TRUE(near(clusters.heaviest_mean(particles), {20.0, 0.0, 0.5}, 0.13));
 }
 
@@ -155,14 +157,14 @@ TEST(Clusters, ChainOfTouchingCellsIsOneInEveryDirection) {
     ParticleClusters clusters(100, 1.0);
     clusters.find(particles);
     EXPECT_EQ(clusters.count(), 1u);
-    EXPECT_NEAR(clusters.heaviest_mass(), 1.0, 1e-12);
+    EXPECT_NEAR(clusters.heaviest_mass(), 1.0, kFloats);
     // Without one of them there are two; a particle of no weight does not bridge the gap.
     std::vector<double> weights(100, 1.0);
     weights[40] = 1e-6;
     set_weights(particles, weights);
     clusters.find(particles);
     EXPECT_EQ(clusters.count(), 2u);
-    EXPECT_NEAR(clusters.heaviest_mass(), 59.0 / 99.0, 1e-6);
+    EXPECT_NEAR(clusters.heaviest_mass(), 59.0 / 99.0, 2e-6);
   }
 }
 
@@ -173,7 +175,7 @@ TEST(Clusters, AgreeWithABruteForceSearch) {
     ParticleSet particles = random_particles(n, engine, 12.0);
     std::vector<std::size_t> label(n);
     std::iota(label.begin(), label.end(), 0);
-    const auto cell = [&](const std::vector<double>& values, std::size_t i) { return std::floor(values[i] / 0.8); };
+    const auto cell = [&](const std::vector<float>& values, std::size_t i) { return std::floor(values[i] / 0.8); };
     for (bool changed = true; changed;) {
       changed = false;
       for (std::size_t i = 0; i < n; ++i) {
@@ -207,7 +209,7 @@ TEST(Clusters, ParticlesThatAreNowhereAreLeftOut) {
   ParticleClusters clusters(100, 1.0);
   clusters.find(particles);
   EXPECT_EQ(clusters.count(), 1u);
-  EXPECT_NEAR(clusters.heaviest_mass(), 0.97, 1e-12);
+  EXPECT_NEAR(clusters.heaviest_mass(), 0.97, kFloats);
   EXPECT_TRUE(near(clusters.heaviest_mean(particles), {5.0, 5.0, 1.0}, 0.5));
 }
 

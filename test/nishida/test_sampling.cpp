@@ -28,16 +28,18 @@ Pose2 printed_step(const Pose2& pose, const MotionStep& step, const MotionNoise&
   return moved;
 }
 
-/// Particles before and after sample_motion(), and an engine that has yet to draw what it drew.
+/// Floats of a few metres and radians, after a dozen roundings of 2e-7.
+constexpr double kFloats = 1e-6;
+
+/// Particles before and after sample_motion(), and the stream that it drew from.
 struct Moved {
   MotionStep step;
   ParticleSet before, after;
-  RandomEngine array_engine = make_engine(2);
-  RandomEngine plain_engine = make_engine(2);
+  RandomStream stream{2};
 
   Moved(MotionModel model, const Twist2& twist)
       : step(make_step(model, twist)), before(some_particles()), after(before) {
-    sample_motion(after, step, array_engine);
+    sample_motion(after, step, stream);
   }
 
   static MotionStep make_step(MotionModel model, const Twist2& twist) {
@@ -58,10 +60,9 @@ TEST(SampleMotion, IsMoveNoisilyDrawByDraw) {
                                Twist2{-1.0, 0.3, 2.0}, Twist2{0.0, 0.0, -1.0}}) {
       Moved moved(model, twist);
       for (std::size_t i = 0; i < moved.after.size(); ++i) {
-        const Pose2 plain = move_noisily(moved.before.pose(i), moved.step, draw_motion_noise(moved.plain_engine));
-        ASSERT_TRUE(near(moved.after.pose(i), plain, 1e-13)) << i;  // metres, a dozen roundings of 1e-15
+        const Pose2 plain = move_noisily(moved.before.pose(i), moved.step, motion_noise(moved.stream, i));
+        ASSERT_TRUE(near(moved.after.pose(i), plain, kFloats)) << i;
       }
-      EXPECT_EQ(moved.array_engine, moved.plain_engine);
       EXPECT_EQ(moved.after.log_weight, moved.before.log_weight);
     }
   }
@@ -72,12 +73,42 @@ TEST(SampleMotion, MovesEachParticleByEq8DrawByDraw) {
     for (const Twist2 twist : {Twist2{3.0, 0.7}, Twist2{-1.0, 0.4}, Twist2{0.0, 0.4}, Twist2{0.0, 0.0}}) {
       Moved moved(model, twist);
       for (std::size_t i = 0; i < moved.after.size(); ++i) {
-        const Pose2 printed = printed_step(moved.before.pose(i), moved.step, draw_motion_noise(moved.plain_engine));
-        // v / omega times a difference of sines loses up to six digits where omega is 1e-3.
-        ASSERT_TRUE(near(moved.after.pose(i), printed, 1e-9)) << i;
+        const Pose2 printed = printed_step(moved.before.pose(i), moved.step, motion_noise(moved.stream, i));
+        ASSERT_TRUE(near(moved.after.pose(i), printed, kFloats)) << i;
       }
-      EXPECT_EQ(moved.array_engine, moved.plain_engine);
       EXPECT_EQ(moved.after.log_weight, moved.before.log_weight);
+    }
+  }
+}
+
+TEST(SampleMotion, NoiseOfAParticleIsItsOwn) {
+  // Neither the number of particles nor how many are moved at once matters.
+  const Moved all(MotionModel::kVelocity, {3.0, 0.7});
+  ParticleSet some(300);
+  for (std::size_t i = 0; i < some.size(); ++i) some.set_pose(i, all.before.pose(i));
+  sample_motion(some, all.step, all.stream);
+  for (std::size_t i = 0; i < some.size(); ++i) {
+    ASSERT_EQ(some.x[i], all.after.x[i]);
+    ASSERT_EQ(some.y[i], all.after.y[i]);
+    ASSERT_EQ(some.yaw[i], all.after.yaw[i]);
+  }
+}
+
+TEST(SampleMotion, FollowsAnyTurnAndAnyNoise) {
+  const Moved turns(MotionModel::kVelocity, {3.0, 400.0});  // three turns in a step
+  for (std::size_t i = 0; i < turns.after.size(); ++i) {
+    const Pose2 plain = move_noisily(turns.before.pose(i), turns.step, motion_noise(turns.stream, i));
+    ASSERT_TRUE(near(turns.after.pose(i), plain, 1e-5)) << i;  // floats of 20 rad have roundings of 2e-6
+  }
+  for (const double wild : {1.0, 1e3, 1e30}) {
+    ParticleSet particles = turns.before;
+    MotionStep step = Moved::make_step(MotionModel::kBicycle, {3.0, 0.7});
+    step.input_sigma = wild;  // any angle of the front wheel, also across the robot
+    step.yaw_rate_sigma = wild;
+    sample_motion(particles, step, RandomStream(3));
+    for (std::size_t i = 0; i < particles.size(); ++i) {
+      ASSERT_TRUE(is_finite(particles.pose(i))) << wild;
+      ASSERT_LT((particles.pose(i).position() - turns.before.pose(i).position()).norm(), 1.0) << wild;
     }
   }
 }
@@ -98,7 +129,7 @@ TEST(RingSampler, ReplacesExactlyItsShareEq22) {
     RingSampler ring(particles.size(), share);
     const auto expected = static_cast<std::size_t>(std::lround(share * 1000.0));
     EXPECT_EQ(ring.count(), expected);
-    ring.sample(particles, {100.0, 100.0, 0.3}, 4.0, 0.05, 1.0, engine);
+    ring.sample(particles, {100.0, 100.0, 0.3}, 4.0, 0.05, 1.0, RandomStream(engine()));
     std::size_t replaced = 0;
     for (std::size_t i = 0; i < particles.size(); ++i) {
       if (particles.x[i] != before.x[i]) {
@@ -120,7 +151,7 @@ TEST(RingSampler, ChoosesEveryParticleEquallyOften) {
   std::vector<double> chosen(200, 0.0);
   for (int call = 0; call < 400; ++call) {
     ParticleSet particles(200);
-    ring.sample(particles, {}, 4.0, 0.05, 1.0, engine);
+    ring.sample(particles, {}, 4.0, 0.05, 1.0, RandomStream(engine()));
     for (std::size_t i = 0; i < 200; ++i) chosen[i] += particles.x[i] != 0.0;
   }
   double statistic = 0.0;
@@ -130,20 +161,20 @@ TEST(RingSampler, ChoosesEveryParticleEquallyOften) {
 
 TEST(RingSampler, DrawsRadiusAngleHeadingAndWeightOfEq23To26) {
   const Ring r;
-  RandomEngine engine = make_engine(5);
   ParticleSet particles(Ring::kCount);
   RingSampler ring(Ring::kCount, 1.0);
-  ring.sample(particles, r.predicted, Ring::kRadius, Ring::kRadiusSigma, Ring::kWeightSigma, engine);
+  ring.sample(particles, r.predicted, Ring::kRadius, Ring::kRadiusSigma, Ring::kWeightSigma, RandomStream(5));
   std::vector<double> radii, angles;
   for (std::size_t i = 0; i < particles.size(); ++i) {
     const Eigen::Vector2d way = particles.pose(i).position() - r.predicted.position();
     const double rho = way.norm();
     radii.push_back(rho);
     angles.push_back(std::atan2(way.y(), way.x()));
-    ASSERT_EQ(particles.yaw[i], r.predicted.yaw);
+    ASSERT_EQ(particles.yaw[i], static_cast<float>(r.predicted.yaw));
     const double s2 = Ring::kWeightSigma * Ring::kWeightSigma;
     const double weight = 1.0 / (Ring::kCount * std::sqrt(2.0 * kPi * s2)) * std::exp(-0.5 * rho * rho / s2);
-    ASSERT_NEAR(std::exp(particles.log_weight[i]), weight, 1e-12 * weight);
+    // A float of -11 has a rounding of 5e-7, and rho of 4 m, at 8 m from the origin, as much.
+    ASSERT_NEAR(std::exp(particles.log_weight[i]), weight, 3e-6 * weight);
   }
   EXPECT_TRUE(has_moments(radii, Ring::kRadius, Ring::kRadiusSigma * Ring::kRadiusSigma));
   // Kolmogorov-Smirnov against the uniform distribution; 1.95 / sqrt(n) is exceeded once in a thousand.

@@ -70,7 +70,7 @@ inline Eigen::Matrix2d isotropic(double sigma) { return sigma * sigma * Eigen::M
 
 /// Gives particles their weights, which need not be normalised.
 inline void set_weights(ParticleSet& particles, const std::vector<double>& weights) {
-  for (std::size_t i = 0; i < weights.size(); ++i) particles.log_weight[i] = std::log(weights[i]);
+  for (std::size_t i = 0; i < weights.size(); ++i) particles.log_weight[i] = static_cast<float>(std::log(weights[i]));
   particles.normalise();
 }
 
@@ -79,10 +79,7 @@ inline ParticleSet random_particles(std::size_t count, RandomEngine& engine, dou
   ParticleSet particles(count);
   std::vector<double> weights;
   for (std::size_t i = 0; i < count; ++i) {
-    const Pose2 pose = random_pose(engine, extent_m);
-    particles.x[i] = pose.x;
-    particles.y[i] = pose.y;
-    particles.yaw[i] = pose.yaw;
+    particles.set_pose(i, random_pose(engine, extent_m));
     weights.push_back(0.01 + draw_uniform(engine));
   }
   set_weights(particles, weights);

@@ -4,66 +4,91 @@
 #include <cmath>
 #include <limits>
 
+#include "urban_gnss_localization/common/vector_math.hpp"
+
 namespace urban_gnss {
 namespace {
 
 /// Sums from which a weighted mean pose with its angle on the circle follows.
 struct PoseSums {
-  double weight{0.0}, x{0.0}, y{0.0}, cosine{0.0}, sine{0.0};
+  double weight, x, y, cosine, sine;
 
-  void add(const ParticleSet& p, std::size_t i) {
-    const double w = p.weight[i];
-    weight += w;
-    x += w * p.x[i];
-    y += w * p.y[i];
-    cosine += w * std::cos(p.yaw[i]);
-    sine += w * std::sin(p.yaw[i]);
+  Pose2 mean(const Eigen::Vector2d& origin) const {
+    return {origin.x() + x / weight, origin.y() + y / weight, std::atan2(sine, cosine)};
   }
-  Pose2 mean() const { return {x / weight, y / weight, std::atan2(sine, cosine)}; }
 };
 
-PoseSums sums_of(const ParticleSet& particles) {
-  PoseSums sums;
-  for (std::size_t i = 0; i < particles.size(); ++i) sums.add(particles, i);
-  return sums;
+/// Of the particles that `is_in` names; what the others are does not matter.
+template <class IsIn>
+URBAN_GNSS_INLINE PoseSums sum_poses(const ParticleSet& particles, const IsIn& is_in) {
+  const float* const weight = particles.weight.data();
+  const float* const x = particles.x.data();
+  const float* const y = particles.y.data();
+  const float* const yaw = particles.yaw.data();
+  const auto sums = vector_sums<5>(particles.size(), [&](std::size_t i) URBAN_GNSS_INLINE_LAMBDA {
+    const bool in = is_in(i);
+    const SineCosine heading = vector_sincos(in ? yaw[i] : 0.0F);
+    const double w = in ? weight[i] : 0.0F;
+    return std::array<double, 5>{w, w * (in ? x[i] : 0.0F), w * (in ? y[i] : 0.0F), w * heading.cosine,
+                                 w * heading.sine};
+  });
+  return {sums[0], sums[1], sums[2], sums[3], sums[4]};
+}
+
+URBAN_GNSS_VECTORISED PoseSums sums_of(const ParticleSet& particles) {
+  return sum_poses(particles, [](std::size_t) URBAN_GNSS_INLINE_LAMBDA { return true; });
+}
+
+URBAN_GNSS_VECTORISED PoseSums sums_of(const ParticleSet& particles, const std::vector<std::uint32_t>& groups,
+                                       std::uint32_t one) {
+  const std::uint32_t* const group = groups.data();
+  return sum_poses(particles, [=](std::size_t i) URBAN_GNSS_INLINE_LAMBDA { return group[i] == one; });
 }
 
 }  // namespace
 
-double effective_sample_size(const ParticleSet& particles) {
-  double squares = 0.0;
-  for (const double w : particles.weight) squares += w * w;
-  return 1.0 / squares;
+URBAN_GNSS_VECTORISED double effective_sample_size(const ParticleSet& particles) {
+  const float* const weight = particles.weight.data();
+  const auto squares = vector_sums<1>(particles.size(), [=](std::size_t i) URBAN_GNSS_INLINE_LAMBDA {
+    const double w = weight[i];
+    return std::array<double, 1>{w * w};
+  });
+  return 1.0 / squares[0];
 }
 
-Pose2 circular_mean(const ParticleSet& particles) { return sums_of(particles).mean(); }
+Pose2 circular_mean(const ParticleSet& particles) { return sums_of(particles).mean(particles.origin); }
 
 Pose2 arithmetic_mean(const ParticleSet& particles) {
   Pose2 mean;
-  for (std::size_t i = 0; i < particles.size(); ++i) {
-    mean.x += particles.weight[i] * particles.x[i];
-    mean.y += particles.weight[i] * particles.y[i];
-    mean.yaw += particles.weight[i] * particles.yaw[i];
-  }
-  return mean;
-}
-
-Eigen::Matrix3d covariance_about(const ParticleSet& particles, const Pose2& mean) {
-  double xx = 0.0, xy = 0.0, yy = 0.0, xt = 0.0, yt = 0.0, tt = 0.0;
+  double total = 0.0;
   for (std::size_t i = 0; i < particles.size(); ++i) {
     const double w = particles.weight[i];
-    const double dx = particles.x[i] - mean.x;
-    const double dy = particles.y[i] - mean.y;
-    const double dt = angle_difference(particles.yaw[i], mean.yaw);
-    xx += w * dx * dx;
-    xy += w * dx * dy;
-    yy += w * dy * dy;
-    xt += w * dx * dt;
-    yt += w * dy * dt;
-    tt += w * dt * dt;
+    const Pose2 pose = particles.pose(i);
+    mean.x += w * particles.x[i];
+    mean.y += w * particles.y[i];
+    mean.yaw += w * pose.yaw;
+    total += w;
   }
+  return {particles.origin.x() + mean.x / total, particles.origin.y() + mean.y / total, mean.yaw / total};
+}
+
+URBAN_GNSS_VECTORISED Eigen::Matrix3d covariance_about(const ParticleSet& particles, const Pose2& mean) {
+  const float* const weight = particles.weight.data();
+  const float* const x = particles.x.data();
+  const float* const y = particles.y.data();
+  const float* const yaw = particles.yaw.data();
+  const double mean_x = mean.x - particles.origin.x();
+  const double mean_y = mean.y - particles.origin.y();
+  const auto mean_yaw = static_cast<float>(mean.yaw);
+  const auto sums = vector_sums<6>(particles.size(), [=](std::size_t i) URBAN_GNSS_INLINE_LAMBDA {
+    const double w = weight[i];
+    const double dx = x[i] - mean_x;
+    const double dy = y[i] - mean_y;
+    const double dt = vector_wrap(yaw[i] - mean_yaw);
+    return std::array<double, 6>{w * dx * dx, w * dx * dy, w * dy * dy, w * dx * dt, w * dy * dt, w * dt * dt};
+  });
   Eigen::Matrix3d covariance;
-  covariance << xx, xy, xt, xy, yy, yt, xt, yt, tt;
+  covariance << sums[0], sums[1], sums[3], sums[1], sums[2], sums[4], sums[3], sums[4], sums[5];
   return covariance;
 }
 
@@ -147,11 +172,8 @@ void ParticleClusters::find(const ParticleSet& particles) {
 }
 
 Pose2 ParticleClusters::heaviest_mean(const ParticleSet& particles) const {
-  PoseSums sums;
-  for (std::size_t i = 0; i < particles.size(); ++i) {
-    if (is_in_heaviest(i)) sums.add(particles, i);
-  }
-  return sums.weight > 0.0 ? sums.mean() : circular_mean(particles);
+  if (heaviest_ == kNone) return circular_mean(particles);
+  return sums_of(particles, cell_of_particle_, heaviest_).mean(particles.origin);
 }
 
 }  // namespace urban_gnss

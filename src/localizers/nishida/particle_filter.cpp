@@ -78,8 +78,9 @@ void ParticleFilter::initialize(const PoseEstimate& start) {
 }
 
 void ParticleFilter::move(const Twist2& twist, double duration_s) {
-  sample_motion(particles_, make_motion_step(twist, duration_s, motion_), engine_);
+  sample_motion(particles_, make_motion_step(twist, duration_s, motion_), next_stream());
   estimate_ = urban_gnss::move(estimate_, twist, duration_s);
+  particles_.recentre(estimate_.position());
   turn_since_fix_ += twist.yaw_rate_radps * duration_s;
 }
 
@@ -96,7 +97,7 @@ FixOutcome ParticleFilter::correct(const FixMeasurement& fix) {
 
   // Sample: the motion has been drawn by move(); what is left of (22) is the ring.
   ring_.sample(particles_, estimate_, fix.bias_radius_m, parameters_.fix.direct_sigma, parameters_.fix.shadow_sigma,
-               engine_);
+               next_stream());
 
   // Weigh.
   weigh(particles_, likelihood_of(fix));
@@ -112,7 +113,7 @@ FixOutcome ParticleFilter::correct(const FixMeasurement& fix) {
   turn_since_fix_ = 0.0;
 
   // Resample.
-  if (effective_sample_size_ < parameters_.ess_threshold) resampler_.resample(particles_, engine_);
+  if (effective_sample_size_ < parameters_.ess_threshold) resampler_.resample(particles_, next_stream());
   return outcome;
 }
 

@@ -283,14 +283,14 @@ void SwitchingParticleFilter::update_estimate() {
   estimate_ = {sums[0] / mass, sums[1] / mass, std::atan2(sums[3], sums[2])};
 
   particles_.resize(hypotheses_.size());
+  particles_.origin = estimate_.position();
   for (std::size_t i = 0; i < hypotheses_.size(); ++i) {
     const BiasGaussian& state = hypotheses_[i].state;
     const Eigen::LLT<Eigen::Matrix3d> root(state.covariance.topLeftCorner<3, 3>());
     const Eigen::Vector3d offset =
         root.info() == Eigen::Success ? Eigen::Vector3d(root.matrixL() * draws_[i]) : Eigen::Vector3d::Zero().eval();
-    particles_.x[i] = state.mean[0] + offset[0];
-    particles_.y[i] = state.mean[1] + offset[1];
-    particles_.yaw[i] = wrap_angle(state.mean[kYaw] + offset[kYaw]);
+    particles_.set_pose(
+        i, {state.mean[0] + offset[0], state.mean[1] + offset[1], wrap_angle(state.mean[kYaw] + offset[kYaw])});
     particles_.weight[i] = hypotheses_[i].weight;
     particles_.log_weight[i] = std::log(hypotheses_[i].weight);
   }

@@ -98,6 +98,7 @@ class ParticleFilter : public ParticleLocalizer {
   LocalizerHealth health() const override;
 
  private:
+  RandomStream next_stream() { return RandomStream(engine_()); }
   FixLikelihood likelihood_of(const FixMeasurement& fix) const;
   Pose2 posterior_mean();
   void examine(const FixMeasurement& fix, FixOutcome& outcome) const;

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "urban_gnss_localization/common/counter_random.hpp"
 #include "urban_gnss_localization/common/parameters.hpp"
 #include "urban_gnss_localization/localizers/particle_set.hpp"
 
@@ -21,21 +22,18 @@ class Resampler {
   Resampler(std::size_t particle_count, ResamplingScheme scheme);
 
   /// Requires normalised weights.
-  void resample(ParticleSet& particles, RandomEngine& engine);
-
-  /// Gives numbers that stand beside the poses the parents of the last call of resample().
-  void gather(std::vector<double>& values);
+  void resample(ParticleSet& particles, const RandomStream& stream);
 
   /// Which old particle each new one is a copy of, ascending: of the last call.
   const std::vector<std::uint32_t>& parents() const { return parents_; }
 
  private:
-  void draw_multinomial(const std::vector<double>& weight, RandomEngine& engine);
-  void draw_systematic(const std::vector<double>& weight, RandomEngine& engine);
+  void draw_multinomial(const std::vector<float>& weight, const RandomStream& stream);
+  void draw_systematic(const std::vector<float>& weight, const RandomStream& stream);
 
   ResamplingScheme scheme_;
   std::vector<std::uint32_t> parents_;
-  std::vector<double> scratch_;
+  std::vector<float> scratch_;
 };
 
 }  // namespace urban_gnss
