@@ -6,6 +6,7 @@
 #include <benchmark/benchmark.h>
 
 #include <memory>
+#include <random>
 
 #include "urban_gnss_localization/localizers/nishida/bias_kalman_filter.hpp"
 #include "urban_gnss_localization/localizers/nishida/particle_filter.hpp"
@@ -137,24 +138,28 @@ BENCHMARK(BM_MoveNoisilyLoop)
     ->ArgsProduct({{1000, 10000}, {int(MotionModel::kBicycle), int(MotionModel::kVelocity)}})
     ->Unit(benchmark::kMicrosecond);
 
-/// What predicts and weighs: the motion's noise, the likelihood of the paper mode, weights that sum to 1.
-FixLikelihood shadowed_fix() {
+FixLikelihood shadowed_fix(const Pose2& truth = {}) {
   FixLikelihood fix;
-  fix.fix = {2.0, 0.0};
+  fix.fix = truth.position() + Eigen::Vector2d(2.0, 0.0);
   fix.radius = 2.0;
   fix.direct_covariance *= 0.0025;
   fix.shadow_sigma = 0.316;
   return fix;
 }
 
+/// A step of odometry and the weights after a fix in the shadow, by the likelihood of the mode `paper`; weights are
+/// equal before, as after resampling.
 void BM_PredictAndWeigh(benchmark::State& state) {
   ParticleSet particles = cloud(static_cast<std::size_t>(state.range(0)));
   const MotionStep step = make_motion_step(kTwist, kStep_s, paper_motion(static_cast<MotionModel>(state.range(1))));
-  const FixLikelihood fix = shadowed_fix();
   RandomEngine engine = make_engine(2);
+  Pose2 truth;
   for (auto _ : state) {
+    truth = move(truth, kTwist, kStep_s);
+    particles.set_equal_weights();
     sample_motion(particles, step, RandomStream(engine()));
-    weigh(particles, fix);
+    particles.recentre(truth.position());
+    weigh(particles, shadowed_fix(truth));
     particles.normalise();
     benchmark::DoNotOptimize(particles.weight.data());
   }
@@ -165,16 +170,63 @@ BENCHMARK(BM_PredictAndWeigh)
     ->ArgsProduct({{1000, 10000, 100000, 1000000}, {int(MotionModel::kBicycle), int(MotionModel::kVelocity)}})
     ->Unit(benchmark::kMicrosecond);
 
+/// The same as most would write it, like amcl: a struct for each particle, and the distributions of the standard
+/// library.
+struct PlainParticle {
+  Pose2 pose;
+  double weight{0.0};
+};
+
+std::vector<PlainParticle> plain_cloud(std::size_t count) {
+  const ParticleSet particles = cloud(count);
+  std::vector<PlainParticle> plain(count);
+  for (std::size_t i = 0; i < count; ++i) plain[i] = {particles.pose(i), particles.weight[i]};
+  return plain;
+}
+
+void BM_PredictAndWeighStructs(benchmark::State& state) {
+  std::vector<PlainParticle> particles = plain_cloud(static_cast<std::size_t>(state.range(0)));
+  const MotionStep step = make_motion_step(kTwist, kStep_s, paper_motion(static_cast<MotionModel>(state.range(1))));
+  const double share = 1.0 / static_cast<double>(particles.size());
+  std::mt19937 engine(2);
+  std::normal_distribution<double> normal;
+  Pose2 truth;
+  for (auto _ : state) {
+    truth = move(truth, kTwist, kStep_s);
+    const FixLikelihood fix = shadowed_fix(truth);
+    const double direct_variance = fix.direct_covariance(0, 0);
+    const double shadow_variance = fix.shadow_sigma * fix.shadow_sigma;
+    double sum = 0.0;
+    for (PlainParticle& particle : particles) {
+      MotionNoise noise;
+      noise.speed = normal(engine);
+      noise.input = normal(engine);
+      noise.yaw_rate = normal(engine);
+      particle.pose = move_noisily(particle.pose, step, noise);
+      const double distance2 = (particle.pose.position() - fix.fix).squaredNorm();
+      const double from_ring = std::sqrt(distance2) - fix.radius;
+      const double direct = std::exp(-0.5 * distance2 / direct_variance) / (2.0 * kPi * direct_variance);
+      const double shadow = std::exp(-0.5 * from_ring * from_ring / shadow_variance) /
+                            (std::sqrt(2.0 * kPi * shadow_variance) * 2.0 * kPi * fix.radius);
+      particle.weight = share * (0.5 * direct + 0.5 * shadow);
+      sum += particle.weight;
+    }
+    for (PlainParticle& particle : particles) particle.weight /= sum;
+    benchmark::DoNotOptimize(particles.data());
+  }
+  state.SetLabel(enum_name(step.model));
+  count_particles(state);
+}
+BENCHMARK(BM_PredictAndWeighStructs)
+    ->ArgsProduct({{1000, 10000, 100000, 1000000}, {int(MotionModel::kBicycle), int(MotionModel::kVelocity)}})
+    ->Unit(benchmark::kMicrosecond);
+
 void BM_Weigh(benchmark::State& state) {
   const ParticleSet original = cloud(static_cast<std::size_t>(state.range(0)));
   ParticleSet particles = original;
-  FixLikelihood fix;
+  FixLikelihood fix = shadowed_fix();
   fix.form = static_cast<LikelihoodForm>(state.range(1));
   fix.with_heading = fix.form != LikelihoodForm::kProduct;
-  fix.fix = {2.0, 0.0};
-  fix.radius = 2.0;
-  fix.direct_covariance *= 0.0025;
-  fix.shadow_sigma = 0.316;
   for (auto _ : state) {
     particles.log_weight = original.log_weight;
     weigh(particles, fix);
@@ -187,6 +239,19 @@ BENCHMARK(BM_Weigh)
     ->ArgsProduct({{1000, 10000},
                    {int(LikelihoodForm::kPrinted), int(LikelihoodForm::kSum), int(LikelihoodForm::kProduct)}})
     ->Unit(benchmark::kMicrosecond);
+
+/// What the estimate takes: effective sample size, clusters, mean pose of the heaviest, covariance about it.
+void BM_Estimate(benchmark::State& state) {
+  const ParticleSet particles = cloud(static_cast<std::size_t>(state.range(0)));
+  ParticleClusters clusters(particles.size(), 0.1);
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(effective_sample_size(particles));
+    clusters.find(particles);
+    benchmark::DoNotOptimize(covariance_about(particles, clusters.heaviest_mean(particles)));
+  }
+  count_particles(state);
+}
+BENCHMARK(BM_Estimate)->Arg(1000)->Arg(10000)->Arg(100000)->Unit(benchmark::kMicrosecond);
 
 void BM_Clusters(benchmark::State& state) {
   const ParticleSet particles = cloud(static_cast<std::size_t>(state.range(0)));
@@ -216,6 +281,25 @@ void BM_Resampling(benchmark::State& state) {
 BENCHMARK(BM_Resampling)
     ->ArgsProduct({{1000, 10000}, {int(ResamplingScheme::kMultinomial), int(ResamplingScheme::kSystematic)}})
     ->Unit(benchmark::kMicrosecond);
+
+/// The same as most would write it.
+void BM_ResamplingDiscreteDistribution(benchmark::State& state) {
+  const std::vector<PlainParticle> original = plain_cloud(static_cast<std::size_t>(state.range(0)));
+  std::vector<PlainParticle> particles(original.size());
+  std::vector<double> weights(original.size());
+  std::mt19937 engine(3);
+  for (auto _ : state) {
+    for (std::size_t i = 0; i < weights.size(); ++i) weights[i] = original[i].weight;
+    std::discrete_distribution<std::size_t> draw(weights.begin(), weights.end());
+    for (PlainParticle& particle : particles) {
+      particle = original[draw(engine)];
+      particle.weight = 1.0 / static_cast<double>(particles.size());
+    }
+    benchmark::DoNotOptimize(particles.data());
+  }
+  count_particles(state);
+}
+BENCHMARK(BM_ResamplingDiscreteDistribution)->Arg(1000)->Arg(10000)->Unit(benchmark::kMicrosecond);
 
 void BM_BiasKalmanStep(benchmark::State& state) {
   BiasKalmanFilter filter;
