@@ -1,15 +1,13 @@
 #include "urban_gnss_localization/occlusion/scan_aligner.hpp"
 
-#include <pcl/kdtree/kdtree_flann.h>
-
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <sstream>
 #include <utility>
 
-#include "pcl_cloud.hpp"
 #include "pcl_icp.hpp"
+#include "urban_gnss_localization/occlusion/point_grid.hpp"
 
 namespace urban_gnss {
 namespace {
@@ -202,8 +200,8 @@ void ScanAlignerParameters::check(std::vector<std::string>& faults) const {
 }
 
 struct ScanAligner::Target {
-  pcl::KdTreeFLANN<pcl::PointXYZ> search;
   PointCloud points;
+  PointGrid search;
 
   struct Plane {
     bool is_known{false};
@@ -214,18 +212,17 @@ struct ScanAligner::Target {
 
   Plane fit(std::size_t point, int neighbours) const {
     constexpr double kMaxThickness = 0.1;  // variance across, of that along the narrower axis in the plane
-    std::vector<int> indices;
-    std::vector<float> squared;
-    search.nearestKSearch(pcl::PointXYZ(points[point].x(), points[point].y(), points[point].z()), neighbours, indices,
-                          squared);
+    std::vector<PointGrid::Neighbour> nearest;
+    nearest.reserve(static_cast<std::size_t>(neighbours));
+    search.nearest(points[point], static_cast<std::size_t>(neighbours), nearest);
     Plane plane;
     plane.is_known = true;
     plane.center.setZero();
-    for (const int i : indices) plane.center += points[static_cast<std::size_t>(i)].cast<double>();
-    plane.center /= static_cast<double>(indices.size());
+    for (const auto& each : nearest) plane.center += points[each.point].cast<double>();
+    plane.center /= static_cast<double>(nearest.size());
     Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
-    for (const int i : indices) {
-      const Eigen::Vector3d offset = points[static_cast<std::size_t>(i)].cast<double>() - plane.center;
+    for (const auto& each : nearest) {
+      const Eigen::Vector3d offset = points[each.point].cast<double>() - plane.center;
       scatter += offset * offset.transpose();
     }
     Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
@@ -242,16 +239,11 @@ struct ScanAligner::Target {
                         const ScanAlignerParameters& p, Planes& planes) const {
     Constraints sum;
     const Eigen::Vector3d pivot = pose * source.middle;
-    std::vector<int> nearest(1);
-    std::vector<float> squared(1);
+    PointGrid::Neighbour nearest;
     for (const Eigen::Vector3f& point : source.points) {
       const Eigen::Vector3d moved = pose * point.cast<double>();
-      const Eigen::Vector3f single = moved.cast<float>();
-      if (search.nearestKSearch(pcl::PointXYZ(single.x(), single.y(), single.z()), 1, nearest, squared) != 1 ||
-          squared[0] > tolerance.near_m * tolerance.near_m) {
-        continue;
-      }
-      const auto index = static_cast<std::size_t>(nearest[0]);
+      if (!search.nearest(moved.cast<float>(), tolerance.near_m, nearest)) continue;
+      const std::size_t index = nearest.point;
       Plane& plane = planes[index];
       if (!plane.is_known) plane = fit(index, p.normal_neighbours);
       if (!plane.is_flat) continue;
@@ -304,7 +296,7 @@ ScanAligner::ScanAligner(const PointCloud& map, const ScanAlignerParameters& par
     : target_(std::make_unique<Target>()), parameters_(parameters) {
   require_usable("scan aligner", parameters);
   target_->points = finite_points(map);
-  if (!target_->points.empty()) target_->search.setInputCloud(to_pcl(target_->points));
+  target_->search = PointGrid(target_->points, parameters.final_distance);
 }
 
 ScanAligner::~ScanAligner() = default;

@@ -49,12 +49,11 @@ InsertReport VoxelMap::add_scan(const PointCloud& points, const Eigen::Vector3d&
     report.unusable = points.size();
     return report;
   }
-  for (const Eigen::Vector3f& point : points) add_point(point, report);
+  add_points_of(points, report);
   // The phase runs on from scan to scan, so that it is not always the same beams that are followed.
   const auto stride = static_cast<std::size_t>(parameters_.ray_stride);
   for (std::size_t i = ray_phase_ % stride; i < points.size(); i += stride) {
-    const Eigen::Vector3d end = points[i].cast<double>();
-    if (end.allFinite() && end.cwiseAbs().maxCoeff() < farthest_m_) follow_ray(sensor, end);
+    if (is_usable(points[i])) follow_ray(sensor, points[i].cast<double>());
   }
   ray_phase_ = (ray_phase_ + 7) % stride;
   if (!((sensor - last_drop_).norm() < kDropInterval * parameters_.window)) {
@@ -69,30 +68,82 @@ InsertReport VoxelMap::add_scan(const PointCloud& points, const Eigen::Vector3d&
 InsertReport VoxelMap::add_points(const PointCloud& points) {
   InsertReport report;
   report.points = points.size();
-  for (const Eigen::Vector3f& point : points) add_point(point, report);
+  add_points_of(points, report);
   if (!bounds_.isEmpty()) report.dropped_by_limit = limit_size(bounds_.center());
   return report;
 }
 
-void VoxelMap::add_point(const Eigen::Vector3f& point, InsertReport& report) {
-  if (!point.allFinite() || !(point.cwiseAbs().maxCoeff() < farthest_m_)) {
-    ++report.unusable;
-    return;
+/// In three goes through a few points at a time, each of which asks for the memory of the next: so the points wait for
+/// memory together.
+void VoxelMap::add_points_of(const PointCloud& points, InsertReport& report) {
+  struct Place {
+    VoxelCoordinates voxel;
+    Index cell;  ///< kNone where there is no brick yet
+    std::uint64_t bit;
+  };
+  constexpr std::size_t kTogether = 32;
+  std::array<Place, kTogether> places;
+  BrickCursor cursor;
+  for (std::size_t begin = 0; begin < points.size(); begin += kTogether) {
+    const std::size_t count = std::min(kTogether, points.size() - begin);
+    for (std::size_t i = 0; i < count; ++i) {
+      const Eigen::Vector3f& point = points[begin + i];
+      Place& place = places[i];
+      place.bit = 0;
+      if (!is_usable(point)) continue;
+      place.voxel = voxel_of(point.cast<double>(), inverse_voxel_);
+      place.bit = cell_bits::bit_of(place.voxel);
+      const VoxelCoordinates cell = cell_of(place.voxel);
+      const Index brick = find_brick(brick_of(cell), cursor);
+      place.cell = brick == kNone ? kNone : kPlaces * brick + cell_bits::place_of(cell);
+      if (brick == kNone) continue;
+      __builtin_prefetch(&masks_[place.cell]);
+      __builtin_prefetch(&blocks_[place.cell]);
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+      const Place& place = places[i];
+      if (place.bit == 0 || place.cell == kNone) continue;
+      const Index voxel = blocks_[place.cell].begin + cell_bits::rank(masks_[place.cell], place.bit);
+      __builtin_prefetch(surface_.data() + voxel, 1);
+      __builtin_prefetch(counts_.data() + voxel, 1);
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+      const Place& place = places[i];
+      if (place.bit == 0) {
+        ++report.unusable;
+        continue;
+      }
+      const Eigen::Vector3f& point = points[begin + i];
+      if (place.cell == kNone || (masks_[place.cell] & place.bit) == 0) {
+        add_to_new_voxel(point, place.voxel, report);
+        cursor = {};
+        continue;
+      }
+      add_to(blocks_[place.cell].begin + cell_bits::rank(masks_[place.cell], place.bit), point);
+    }
   }
-  const VoxelCoordinates coordinates = voxel_of(point.cast<double>(), inverse_voxel_);
-  const VoxelCoordinates cell_coordinates = cell_of(coordinates);
-  const std::uint64_t bit = cell_bits::bit_of(coordinates);
-  const Index found = find_cell(cell_coordinates);
-  if (found != kNone && (masks_[found] & bit) != 0) {
-    const Index voxel = blocks_[found].begin + cell_bits::rank(masks_[found], bit);
-    // The mean follows at least every thousandth return, so that an old voxel is not deaf.
-    const std::uint32_t count = std::min(++counts_[voxel].returns, 1000U);
-    surface_[voxel].mean += (point - surface_[voxel].mean) / static_cast<float>(count);
-    return;
-  }
+}
+
+/// The mean follows at least every thousandth return, so that an old voxel is not deaf.
+void VoxelMap::add_to(Index voxel, const Eigen::Vector3f& point) {
+  const std::uint32_t count = std::min(++counts_[voxel].returns, 1000U);
+  surface_[voxel].mean += (point - surface_[voxel].mean) / static_cast<float>(count);
+}
+
+/// Adds to the voxel of a point that was not there a moment ago, but may be by now.
+void VoxelMap::add_to_new_voxel(const Eigen::Vector3f& point, const VoxelCoordinates& coordinates,
+                                InsertReport& report) {
+  if (const Index voxel = find_voxel(coordinates); voxel != kNone) return add_to(voxel, point);
   ++report.new_voxels;
+  add_voxel(point, coordinates);
+}
+
+void VoxelMap::add_voxel(const Eigen::Vector3f& point, const VoxelCoordinates& coordinates) {
   ++size_;
   bounds_.extend(point.cast<double>());
+  const std::uint64_t bit = cell_bits::bit_of(coordinates);
+  const VoxelCoordinates cell_coordinates = cell_of(coordinates);
+  const Index found = find_cell(cell_coordinates);
   const Index cell = found != kNone && masks_[found] != 0 ? found : occupy(cell_coordinates);
   Block& block = blocks_[cell];
   if (block.count == 0 || block.count == room(block.size_class)) {
@@ -187,16 +238,26 @@ void VoxelMap::follow_ray(const Eigen::Vector3d& sensor, const Eigen::Vector3d& 
   if (last != kNone && meets(last)) count_meeting(last, &Counts::hits);
   // Up to shortly before the return: noise of the range must not make a wall's own returns pass through it.
   const double pass_end_m = length_m - 2.0 * parameters_.voxel_size;
-  walk_voxels(sensor, direction, 0.0, pass_end_m, cell_edge_m_, [&](const auto& cell, double from_m, double to_m) {
-    const Index found = find_cell(cell);
-    if (found == kNone || masks_[found] == 0) return true;
-    walk_voxels(sensor, direction, from_m, to_m, parameters_.voxel_size, [&](const auto& coordinates, double, double) {
-      const Index voxel = find_voxel(coordinates);
+  const GridRay by_voxel(sensor, direction, parameters_.voxel_size);
+  BrickCursor cursor;
+  const auto pass_cell = [&](const VoxelCoordinates& cell, double from_m, double to_m) {
+    const Index brick = find_brick(brick_of(cell), cursor);
+    if (brick == kNone) return true;
+    const Index place = kPlaces * brick + cell_bits::place_of(cell);
+    if (masks_[place] == 0) return true;
+    by_voxel.walk(from_m, to_m, [&](const VoxelCoordinates& coordinates, double, double) {
+      Index voxel = kNone;
+      if (cell_of(coordinates) != cell) {
+        voxel = find_voxel(coordinates);  // on the border rounding may lead into the next cell
+      } else if (const std::uint64_t bit = cell_bits::bit_of(coordinates); (masks_[place] & bit) != 0) {
+        voxel = blocks_[place].begin + cell_bits::rank(masks_[place], bit);
+      }
       if (voxel != kNone && voxel != last && meets(voxel)) count_meeting(voxel, &Counts::passes);
       return true;
     });
     return true;
-  });
+  };
+  GridRay(sensor, direction, cell_edge_m_).walk(0.0, pass_end_m, pass_cell);
 }
 
 void VoxelMap::count_meeting(Index voxel, std::uint32_t Counts::*kind) {
@@ -267,31 +328,39 @@ VoxelMap::Index VoxelMap::find(const Eigen::Vector3d& point) const {
 }
 
 std::size_t VoxelMap::find_nearby(Index index, const VoxelCoordinates& cell, const VoxelCoordinates& low,
-                                  const VoxelCoordinates& high, std::array<CellVoxels, 27>& found) const {
-  const std::uint32_t nearby = nearby_[index];
-  const Index brick = index / kPlaces;
-  const VoxelCoordinates brick_coordinates = brick_of(cell);
-  const VoxelCoordinates first = (cell_of(low)).cwiseMax((cell.array() - 1).matrix());
-  const VoxelCoordinates last = (cell_of(high)).cwiseMin((cell.array() + 1).matrix());
-  std::size_t count = 0;
-  VoxelCoordinates at;
-  for (at.x() = first.x(); at.x() <= last.x(); ++at.x()) {
-    const std::uint64_t in_x = cell_bits::slab(0, at, low, high);
-    for (at.y() = first.y(); at.y() <= last.y(); ++at.y()) {
-      const std::uint64_t in_xy = in_x & cell_bits::slab(1, at, low, high);
-      for (at.z() = first.z(); at.z() <= last.z(); ++at.z()) {
-        if ((nearby & cell_bits::nearby_bit(at.x() - cell.x(), at.y() - cell.y(), at.z() - cell.z())) == 0) continue;
-        const VoxelCoordinates other = brick_of(at);
-        const Index index_of_other =
-            kPlaces * (other == brick_coordinates ? brick : find_brick(other)) + cell_bits::place_of(at);
-        const std::uint64_t mask = masks_[index_of_other];
-        const std::uint64_t wanted = mask & in_xy & cell_bits::slab(2, at, low, high);
-        if (wanted == 0) continue;
-        const Index begin = blocks_[index_of_other].begin;
-        __builtin_prefetch(&surface_[begin + cell_bits::rank(mask, wanted & (~wanted + 1))]);
-        found[count++] = {begin, mask, wanted};
-      }
+                                  const VoxelCoordinates& high, NearbyVoxels& found) const {
+  // For each axis and each of the three cells along it: the voxels in the box, the place in the brick, and whether
+  // that is another brick.
+  std::uint64_t slabs[3][3];
+  std::uint32_t places[3][3];
+  std::uint32_t is_beyond[3][3];
+  std::uint32_t wanted_cells = nearby_[index];
+  for (unsigned axis = 0; axis < 3; ++axis) {
+    for (unsigned side = 0; side < 3; ++side) {
+      const int at = cell[axis] + static_cast<int>(side) - 1;
+      slabs[axis][side] = cell_bits::slab(axis, at, low[axis], high[axis]);
+      places[axis][side] = cell_bits::place_along(axis, at);
+      is_beyond[axis][side] = static_cast<std::uint32_t>((at ^ cell[axis]) >> 2 & 1) << axis;
+      if (slabs[axis][side] == 0) wanted_cells &= ~cell_bits::kNearbyAlong[axis][side];
     }
+  }
+  if (wanted_cells == 0) return 0;
+  // The bricks that the cell's neighbours are in: beyond it along none, one, two or all axes.
+  std::array<Index, 8> bricks;
+  bricks.fill(kNone);
+  bricks[0] = index / kPlaces;
+  std::size_t count = 0;
+  for (; wanted_cells != 0; wanted_cells &= wanted_cells - 1) {
+    const auto& [x, y, z] = cell_bits::kNearbySides[static_cast<std::size_t>(__builtin_ctz(wanted_cells))];
+    Index& brick = bricks[is_beyond[0][x] | is_beyond[1][y] | is_beyond[2][z]];
+    if (brick == kNone) brick = find_brick(brick_of({cell.x() + x - 1, cell.y() + y - 1, cell.z() + z - 1}));
+    const Index other = kPlaces * brick + (places[0][x] | places[1][y] | places[2][z]);
+    const std::uint64_t mask = masks_[other];
+    const std::uint64_t wanted = mask & slabs[0][x] & slabs[1][y] & slabs[2][z];
+    if (wanted == 0) continue;
+    const Index begin = blocks_[other].begin;
+    __builtin_prefetch(&surface_[begin + cell_bits::rank(mask, wanted & (~wanted + 1))]);
+    found[count++] = {begin, mask, wanted};
   }
   return count;
 }

@@ -22,9 +22,10 @@ class RayNeighbourhood {
 
   void clear() { count_ = 0; }
 
-  /// `across` (m) is the point's place in the plane normal to the ray, the ray at the origin. Where there is no room
-  /// the point farthest from the ray gives way.
-  void add(const Eigen::Vector2f& across, const Eigen::Vector3f& point, float along_m) {
+  /// `place` (m): x and y in the plane normal to the ray, the ray at the origin, z along it. Where there is no room the
+  /// point farthest from the ray gives way.
+  void add(const Eigen::Vector4f& place, const Eigen::Vector3f& point) {
+    const Eigen::Vector2f across = place.head<2>();
     std::size_t slot = count_;
     if (count_ == kCapacity) {
       slot = 0;
@@ -37,7 +38,7 @@ class RayNeighbourhood {
     }
     across_[slot] = across;
     point_[slot] = point;
-    along_m_[slot] = along_m;
+    along_m_[slot] = place.z();
   }
 
   /// Whether the ray is between the points at all: no half-plane through it holds them all.
@@ -60,13 +61,15 @@ class RayNeighbourhood {
     std::array<std::uint64_t, kCapacity> linked{};
     std::array<std::uint64_t, kCapacity> left_of{};  // points less than 180 degrees counter-clockwise
     const float limit = link_m * link_m;
+    // Without jumps, which would be foretold wrongly half the time.
     for (std::size_t i = 0; i < count_; ++i) {
       for (std::size_t j = i + 1; j < count_; ++j) {
-        if ((point_[i] - point_[j]).squaredNorm() > limit) continue;
-        linked[i] |= bit(j);
-        linked[j] |= bit(i);
-        const bool is_left = cross(across_[i], across_[j]) > 0.0F;
-        left_of[is_left ? i : j] |= bit(is_left ? j : i);
+        const std::uint64_t is_linked = (point_[i] - point_[j]).squaredNorm() > limit ? 0U : 1U;
+        const std::uint64_t is_left = cross(across_[i], across_[j]) > 0.0F ? 1U : 0U;
+        linked[i] |= is_linked << j;
+        linked[j] |= is_linked << i;
+        left_of[i] |= (is_linked & is_left) << j;
+        left_of[j] |= (is_linked & ~is_left) << i;
       }
     }
     for (std::size_t i = 0; i < count_; ++i) {
@@ -84,7 +87,6 @@ class RayNeighbourhood {
   }
 
  private:
-  static std::uint64_t bit(std::size_t i) { return std::uint64_t{1} << i; }
   static float cross(const Eigen::Vector2f& a, const Eigen::Vector2f& b) { return a.x() * b.y() - a.y() * b.x(); }
 
   /// By the barycentric coordinates of the origin.
@@ -182,30 +184,41 @@ RayOutcome VoxelRayTracer::trace(const Eigen::Vector3d& origin, const Eigen::Vec
   const auto link_m = static_cast<float>(link_m_);
   const double reach_m = kReach * link_m_;
   const auto squared_reach = static_cast<float>(reach_m * reach_m);
-  const double edge_m = map_->cell_edge_m();
   const double inverse_voxel = 1.0 / map_->parameters().voxel_size;
   RayNeighbourhood solid;
   RayNeighbourhood permeable;
+  VoxelMap::NearbyVoxels nearby;
+  std::array<Eigen::Vector4f, cell_bits::kPlaces> places;
+  std::array<VoxelMap::Index, cell_bits::kPlaces> voxels;
 
   const auto visit = [&](VoxelMap::Index center, const VoxelCoordinates& cell, double from_m, double to_m) {
-    solid.clear();
-    permeable.clear();
-    const auto nearest_m = static_cast<float>(std::max(from_m - reach_m, parameters_.min_range));
-    const auto farthest_m = static_cast<float>(std::min(to_m + reach_m, parameters_.max_range));
-    const auto gather = [&](VoxelMap::Index voxel) {
-      const Eigen::Vector4f place = frame.place(map_->position(voxel));
-      const float along_m = place.z();
-      const Eigen::Vector2f across = place.head<2>();
-      if (along_m < nearest_m || along_m > farthest_m || across.squaredNorm() > squared_reach) return;
-      const bool is_solid = map_->permeability(voxel) <= parameters_.max_permeability;
-      (is_solid ? solid : permeable).add(across, map_->position(voxel), along_m);
-    };
     // The voxels that the box about the stretch, widened by the reach, touches: in the cell and its neighbours.
     const Eigen::Vector3d a = origin + from_m * direction;
     const Eigen::Vector3d b = origin + to_m * direction;
     const VoxelCoordinates low = voxel_of((a.cwiseMin(b).array() - reach_m).matrix(), inverse_voxel);
     const VoxelCoordinates high = voxel_of((a.cwiseMax(b).array() + reach_m).matrix(), inverse_voxel);
-    map_->for_each_nearby_voxel(center, cell, low, high, gather);
+    const std::size_t cells = map_->find_nearby(center, cell, low, high, nearby);
+    if (cells == 0) return true;
+    solid.clear();
+    permeable.clear();
+    const auto nearest_m = static_cast<float>(std::max(from_m - reach_m, parameters_.min_range));
+    const auto farthest_m = static_cast<float>(std::min(to_m + reach_m, parameters_.max_range));
+    for (std::size_t i = 0; i < cells; ++i) {
+      // All are written down, and the next one over those that are out of reach: that is quicker than to jump.
+      std::size_t count = 0;
+      VoxelMap::for_each_wanted(nearby[i], [&](VoxelMap::Index voxel) {
+        const Eigen::Vector4f place = frame.place(map_->position(voxel));
+        places[count] = place;
+        voxels[count] = voxel;
+        const bool is_near = place.head<2>().squaredNorm() <= squared_reach;
+        const bool is_along = (place.z() >= nearest_m) & (place.z() <= farthest_m);
+        count += static_cast<std::size_t>(is_near & is_along);
+      });
+      for (std::size_t k = 0; k < count; ++k) {
+        const bool is_solid = map_->permeability(voxels[k]) <= parameters_.max_permeability;
+        (is_solid ? solid : permeable).add(places[k], map_->position(voxels[k]));
+      }
+    }
     if (solid.is_surrounded() && solid.pierced(link_m, outcome.range_m)) {
       outcome.blocked = true;
       return false;
@@ -215,19 +228,19 @@ RayOutcome VoxelRayTracer::trace(const Eigen::Vector3d& origin, const Eigen::Vec
     return true;
   };
 
+  const GridRay by_cell(origin, direction, map_->cell_edge_m());
   const auto visit_brick = [&](const VoxelCoordinates& coordinates, double brick_from_m, double brick_to_m) {
     const VoxelMap::Index brick = map_->find_brick(coordinates);
     if (brick == VoxelMap::kNone) return true;
-    walk_voxels(origin, direction, brick_from_m, brick_to_m, edge_m,
-                [&](const VoxelCoordinates& cell, double from_m, double to_m) {
-                  // On the border rounding may lead into the next brick, for less than a hair's breadth.
-                  if (VoxelMap::brick_of(cell) != coordinates) return true;
-                  const VoxelMap::Index found = map_->find_cell(brick, cell);
-                  return found == VoxelMap::kNone || visit(found, cell, from_m, to_m);
-                });
+    by_cell.walk(brick_from_m, brick_to_m, [&](const VoxelCoordinates& cell, double from_m, double to_m) {
+      // On the border rounding may lead into the next brick, for less than a hair's breadth.
+      if (VoxelMap::brick_of(cell) != coordinates) return true;
+      const VoxelMap::Index found = map_->find_cell(brick, cell);
+      return found == VoxelMap::kNone || visit(found, cell, from_m, to_m);
+    });
     return !outcome.blocked;
   };
-  walk_voxels(origin, direction, inside.begin_m, inside.end_m, map_->brick_edge_m(), visit_brick);
+  GridRay(origin, direction, map_->brick_edge_m()).walk(inside.begin_m, inside.end_m, visit_brick);
   return outcome;
 }
 

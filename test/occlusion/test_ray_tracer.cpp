@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "plain_voxel_ray_tracer.hpp"
 #include "synthetic_walls.hpp"
 #include "urban_gnss_localization/occlusion/kd_tree_ray_tracer.hpp"
 #include "urban_gnss_localization/occlusion/voxel_ray_tracer.hpp"
@@ -153,6 +154,43 @@ TEST(VoxelRayTracer, AgreesWithTryingAllTriangles) {
   }
   EXPECT_GT(blocked, 150);
   EXPECT_LT(blocked, 1000);
+}
+
+TEST(VoxelRayTracer, EqualsThePlainOneToTheLastBit) {
+  RandomEngine engine = make_engine(31);
+  const auto in_cube = [&](double half_m) -> Eigen::Vector3d {
+    return half_m * Eigen::Vector3d(draw_uniform(engine) - 0.5, draw_uniform(engine) - 0.5, draw_uniform(engine) - 0.5);
+  };
+  VoxelMapParameters parameters;
+  parameters.ray_stride = 1;
+  int blocked = 0;
+  int in_vegetation = 0;
+  // Sparse, dense with more points about a ray than are kept, and walls.
+  for (const int points : {700, 12000, 0}) {
+    VoxelMap map(parameters);
+    PointCloud cloud = points > 0 ? PointCloud() : sampled(street(), 0.45);
+    for (int i = 0; i < points; ++i) cloud.push_back(in_cube(16.0).cast<float>());
+    for (int scan = 0; scan < 8; ++scan) map.add_scan(cloud, in_cube(20.0));
+    VoxelRayTracerParameters wide;
+    wide.link_length = 4.0;
+    wide.max_permeability = points == 0 ? 0.5 : 0.8;
+    const VoxelRayTracer tracer(map, wide);
+    const PlainVoxelRayTracer plain(map, wide);
+    for (int ray = 0; ray < 400; ++ray) {
+      const Eigen::Vector3d origin = in_cube(40.0);
+      const Eigen::Vector3d direction =
+          ray % 8 == 0 ? Eigen::Vector3d(Eigen::Vector3d::Unit(ray % 3)) : (in_cube(10.0) - origin).normalized().eval();
+      const RayOutcome expected = plain.trace(origin, direction);
+      const RayOutcome outcome = tracer.trace(origin, direction);
+      ASSERT_EQ(outcome.blocked, expected.blocked) << points << " points, ray " << ray;
+      ASSERT_EQ(outcome.range_m, expected.range_m) << points << " points, ray " << ray;
+      ASSERT_EQ(outcome.vegetation_m, expected.vegetation_m) << points << " points, ray " << ray;
+      blocked += outcome.blocked ? 1 : 0;
+      in_vegetation += outcome.vegetation_m > 0.0 ? 1 : 0;
+    }
+  }
+  EXPECT_GT(blocked, 200);
+  EXPECT_GT(in_vegetation, 100);
 }
 
 TEST(VoxelRayTracer, SkippingEmptySpaceSkipsNoWall) {

@@ -7,6 +7,7 @@
 #include <set>
 #include <vector>
 
+#include "plain_voxel_ray_tracer.hpp"
 #include "synthetic_walls.hpp"
 #include "urban_gnss_localization/occlusion/voxel_map.hpp"
 #include "urban_gnss_localization/occlusion/voxel_ray_tracer.hpp"
@@ -85,6 +86,40 @@ TEST(VoxelWalk, PassesWhatDenseSamplesPassAndOnlyThat) {
   }
 }
 
+TEST(VoxelWalk, EqualsThePlainOneToTheLastBit) {
+  RandomEngine engine = make_engine(5);
+  for (int trial = 0; trial < 500; ++trial) {
+    const auto coordinate = [&] { return 20.0 * draw_uniform(engine) - 10.0; };
+    Eigen::Vector3d origin(coordinate(), coordinate(), coordinate());
+    Eigen::Vector3d direction(coordinate(), coordinate(), coordinate());
+    if (trial % 3 == 0) direction[trial % 9 / 3] = 0.0;
+    if (trial % 5 == 0) direction = {1.0, 1.0, trial % 2 == 0 ? 1.0 : -1.0};  // through corners
+    if (trial % 10 == 0) origin = origin.array().round();
+    direction.normalize();
+    struct Step {
+      VoxelCoordinates cube;
+      double from_m;
+      double to_m;
+    };
+    std::vector<Step> plain;
+    walk_plainly(origin, direction, 0.5, 30.0, 0.5, [&](const auto& cube, double from_m, double to_m) {
+      plain.push_back({cube, from_m, to_m});
+      return true;
+    });
+    std::size_t steps = 0;
+    walk_voxels(origin, direction, 0.5, 30.0, 0.5, [&](const auto& cube, double from_m, double to_m) {
+      EXPECT_LT(steps, plain.size());
+      if (steps >= plain.size()) return false;
+      EXPECT_EQ(cube, plain[steps].cube);
+      EXPECT_EQ(from_m, plain[steps].from_m);
+      EXPECT_EQ(to_m, plain[steps].to_m);
+      ++steps;
+      return true;
+    });
+    ASSERT_EQ(steps, plain.size()) << trial;
+  }
+}
+
 TEST(VoxelWalk, StopsWhenTold) {
   int visits = 0;
   walk_voxels({0.5, 0.5, 0.5}, {1, 0, 0}, 0.0, 100.0, 1.0, [&](const auto&, double, double) { return ++visits < 7; });
@@ -106,6 +141,38 @@ TEST(VoxelMap, KeepsMeansAndCounts) {
   map.clear();
   EXPECT_EQ(map.size(), 0u);
   EXPECT_EQ(map.find({0.2, 0.2, 0.2}), VoxelMap::kNone);
+}
+
+TEST(VoxelMap, EqualsPointAfterPointInAPlainMap) {
+  struct Voxel {
+    Eigen::Vector3f mean;
+    std::uint32_t returns;
+  };
+  std::map<std::uint64_t, Voxel> plain;
+  VoxelMap map{VoxelMapParameters()};
+  RandomEngine engine = make_engine(8);
+  for (int cloud = 0; cloud < 20; ++cloud) {
+    PointCloud points;
+    for (int i = 0; i < 997; ++i) {  // many to a voxel, new ones among known ones, neighbours one after the other
+      const double spread_m = i % 2 == 0 ? 1.0 : 12.0;
+      points.push_back(
+          (spread_m * Eigen::Vector3d(draw_normal(engine), draw_normal(engine), draw_normal(engine))).cast<float>());
+    }
+    const std::size_t before = plain.size();
+    for (const Eigen::Vector3f& point : points) {
+      const VoxelCoordinates at = (2.0 * point.cast<double>()).array().floor().cast<int>();
+      Voxel& voxel = plain.emplace(voxel_key(at), Voxel{point, 0}).first->second;
+      if (voxel.returns++ > 0) voxel.mean += (point - voxel.mean) / static_cast<float>(voxel.returns);
+    }
+    EXPECT_EQ(map.add_points(points).new_voxels, plain.size() - before);
+  }
+  ASSERT_EQ(map.size(), plain.size());
+  for (const auto& [key, voxel] : plain) {
+    const auto found = map.find(0.5 * (voxel_of_key(key).cast<double>().array() + 0.5).matrix());
+    ASSERT_NE(found, VoxelMap::kNone);
+    EXPECT_EQ(map.position(found), voxel.mean);
+    EXPECT_EQ(map.returns(found), voxel.returns);
+  }
 }
 
 TEST(VoxelMap, UnusablePointsAreCounted) {

@@ -25,6 +25,9 @@ inline std::uint32_t place_of(const VoxelCoordinates& at) {
   return static_cast<std::uint32_t>(place);
 }
 
+/// The coordinates of a voxel's cell, or of a cell's brick; rounds down below zero, too.
+inline VoxelCoordinates parent_of(const VoxelCoordinates& at) { return {at.x() >> 2, at.y() >> 2, at.z() >> 2}; }
+
 inline std::uint64_t bit_of(const VoxelCoordinates& voxel) { return std::uint64_t{1} << place_of(voxel); }
 /// The coordinates in the brick, or in the cell, of this place.
 inline VoxelCoordinates at_place(std::uint32_t place) {
@@ -49,15 +52,35 @@ inline constexpr std::array<std::array<std::uint64_t, kSide + 1>, 3> kFrom{{
     {~0ULL, 0xFFFFCCCCFFFFCCCCU, 0xFFFF0000FFFF0000U, 0xCCCC0000CCCC0000U, 0U},
     {~0ULL, 0xFFFFFFFFF0F0F0F0U, 0xFFFFFFFF00000000U, 0xF0F0F0F000000000U, 0U},
 }};
-/// The bits of this cell's voxels that are from `low` to `high` along one axis.
-inline std::uint64_t slab(std::size_t axis, const VoxelCoordinates& cell, const VoxelCoordinates& low,
-                          const VoxelCoordinates& high) {
-  const auto place = static_cast<Eigen::Index>(axis);
-  const int corner = kSide * cell[place];
+/// The bits of the voxels that are from `low` to `high` along one axis, of a cell with this coordinate along it.
+inline std::uint64_t slab(std::size_t axis, int cell, int low, int high) {
   const auto from = [&](int voxel) {
-    return kFrom[axis][static_cast<std::size_t>(std::min(std::max(voxel - corner, 0), kSide))];
+    return kFrom[axis][static_cast<std::size_t>(std::min(std::max(voxel - kSide * cell, 0), kSide))];
   };
-  return from(low[place]) & ~from(high[place] + 1);
+  return from(low) & ~from(high + 1);
 }
+
+/// The part of place_of() that a coordinate along one axis makes up.
+inline std::uint32_t place_along(unsigned axis, int at) {
+  return static_cast<std::uint32_t>((at & 1) | (at & 2) << 2) << axis;
+}
+
+/// For each axis the nearby_bit()s of the nine cells on its low side, in its middle and on its high side.
+inline constexpr std::array<std::array<std::uint32_t, 3>, 3> kNearbyAlong{{
+    {0x00001FFU, 0x003FE00U, 0x7FC0000U},
+    {0x01C0E07U, 0x0E07038U, 0x70381C0U},
+    {0x1249249U, 0x2492492U, 0x4924924U},
+}};
+
+/// For each nearby_bit(), from the lowest on, the sides of the three axes: 0, 1 or 2.
+inline constexpr std::array<std::array<std::uint8_t, 3>, 27> kNearbySides = [] {
+  std::array<std::array<std::uint8_t, 3>, 27> sides{};
+  for (std::size_t i = 0; i < 27; ++i) {
+    sides[i][0] = static_cast<std::uint8_t>(i / 9);
+    sides[i][1] = static_cast<std::uint8_t>(i / 3 % 3);
+    sides[i][2] = static_cast<std::uint8_t>(i % 3);
+  }
+  return sides;
+}();
 
 }  // namespace urban_gnss::cell_bits

@@ -2,12 +2,15 @@
 
 #include <Eigen/Core>
 #include <cstddef>
+#include <cstdint>
+#include <vector>
 
 #include "urban_gnss_localization/occlusion/key_index.hpp"
 
 namespace urban_gnss {
 
-/// The coarse cubes of space that a lidar's rays have passed. They tell free sky from sky that the lidar never saw.
+/// The coarse cubes of space that a lidar's rays have passed. They tell free sky from sky that the lidar never saw. A
+/// hash table finds bricks of 4 x 4 x 4 cubes, each a mask of one bit a cube.
 class ObservedSpace {
  public:
   /// `edge_m` > 0 is the edge of a cube.
@@ -22,13 +25,14 @@ class ObservedSpace {
   /// Forgets the cubes whose centre is farther than `distance_m` from `center`.
   void drop_beyond(const Eigen::Vector3d& center, double distance_m);
 
-  void clear() { cubes_.clear(); }
-  std::size_t size() const { return cubes_.size(); }
-  std::size_t memory_bytes() const { return cubes_.memory_bytes(); }
+  void clear();
+  std::size_t size() const;
+  std::size_t memory_bytes() const;
 
  private:
   double edge_m_;
-  KeyIndex cubes_;
+  KeyIndex bricks_;
+  std::vector<std::uint64_t> masks_;  ///< of each brick's cubes
 };
 
 }  // namespace urban_gnss

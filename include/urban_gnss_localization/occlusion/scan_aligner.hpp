@@ -96,10 +96,10 @@ struct Alignment {
   bool is_accepted() const { return decision == AlignmentDecision::kAccepted; }
 };
 
-/// Point-to-plane ICP (Chen & Medioni 1992) of a scan to a map with a check of its health. Nearest points come from
-/// PCL's kd-tree. Whichever method finds the pose, it is judged by the same figures: which points are inliers, and how
-/// well each direction is constrained. pcl::IterativeClosestPointWithNormals tells neither, and moves in all six
-/// directions: with kPlanar x, y and yaw are taken of what it finds.
+/// Point-to-plane ICP (Chen & Medioni 1992) of a scan to a map with a check of its health. Whichever method finds the
+/// pose, it is judged by the same figures: which points are inliers, and how well each direction is constrained.
+/// pcl::IterativeClosestPointWithNormals tells neither, and moves in all six directions: with kPlanar x, y and yaw are
+/// taken of what it finds.
 class ScanAligner {
  public:
   /// `map` (m, map frame) is copied; non-finite points are left out. Throws ParameterError.
@@ -110,7 +110,7 @@ class ScanAligner {
   Alignment align(const PointCloud& scan, const Eigen::Isometry3d& guess) const;
 
  private:
-  struct Target;  // keeps PCL's headers out of this one
+  struct Target;
   std::unique_ptr<Target> target_;
   ScanAlignerParameters parameters_;
 };

@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -106,21 +107,25 @@ class VoxelMap {
     const Index brick = find_brick(brick_of(cell));
     return brick == kNone ? kNone : find_cell(brick, cell);
   }
-  static VoxelCoordinates cell_of(const VoxelCoordinates& voxel) { return brick_of(voxel); }
-  static VoxelCoordinates brick_of(const VoxelCoordinates& cell) {
-    return {cell.x() >> 2, cell.y() >> 2, cell.z() >> 2};  // rounds down below zero, too
-  }
-  /// Calls visit(voxel) for each voxel with coordinates from `low` to `high` (both included) in this cell and its 26
-  /// neighbours. Cells are picked by a mask of those that hold something, voxels by masks of the slabs of the box.
+  static VoxelCoordinates cell_of(const VoxelCoordinates& voxel) { return cell_bits::parent_of(voxel); }
+  static VoxelCoordinates brick_of(const VoxelCoordinates& cell) { return cell_bits::parent_of(cell); }
+  /// Voxels of one cell, and those of them that are asked for.
+  struct CellVoxels {
+    Index begin;
+    std::uint64_t mask;
+    std::uint64_t wanted;
+  };
+  using NearbyVoxels = std::array<CellVoxels, 27>;
+  /// The cells, of this one and its 26 neighbours, that hold a voxel with coordinates from `low` to `high` (both
+  /// included): so many of `found`. Cells are picked by a mask of those that hold something, voxels by masks of the
+  /// slabs of the box. The voxels' memory is asked for, and not waited for.
+  std::size_t find_nearby(Index index, const VoxelCoordinates& cell, const VoxelCoordinates& low,
+                          const VoxelCoordinates& high, NearbyVoxels& found) const;
+  /// Calls visit(voxel) for each of the voxels that are asked for.
   template <class Visit>
-  void for_each_nearby_voxel(Index index, const VoxelCoordinates& cell, const VoxelCoordinates& low,
-                             const VoxelCoordinates& high, Visit&& visit) const {
-    std::array<CellVoxels, 27> found;
-    const std::size_t count = find_nearby(index, cell, low, high, found);
-    for (std::size_t i = 0; i < count; ++i) {
-      for (std::uint64_t rest = found[i].wanted; rest != 0; rest &= rest - 1) {
-        visit(found[i].begin + cell_bits::rank(found[i].mask, rest & (~rest + 1)));
-      }
+  static void for_each_wanted(const CellVoxels& cell, Visit&& visit) {
+    for (std::uint64_t rest = cell.wanted; rest != 0; rest &= rest - 1) {
+      visit(cell.begin + cell_bits::rank(cell.mask, rest & (~rest + 1)));
     }
   }
 
@@ -136,13 +141,6 @@ class VoxelMap {
     std::uint8_t size_class{0};  ///< only where count > 0
   };
 
-  /// Voxels of a cell, and those of them that are wanted.
-  struct CellVoxels {
-    Index begin;
-    std::uint64_t mask;
-    std::uint64_t wanted;
-  };
-
   struct Surface {
     Eigen::Vector3f mean{Eigen::Vector3f::Zero()};
     float permeability{0.0F};
@@ -155,14 +153,26 @@ class VoxelMap {
 
   static Index room(std::size_t size_class) { return Index{4} << size_class; }
 
-  void add_point(const Eigen::Vector3f& point, InsertReport& report);
+  /// The brick that was asked for last, which the next question mostly is about, too.
+  struct BrickCursor {
+    VoxelCoordinates at{VoxelCoordinates::Constant(std::numeric_limits<int>::max())};
+    Index brick{kNone};
+  };
+
+  bool is_usable(const Eigen::Vector3f& point) const {
+    return std::abs(point.x()) < farthest_m_ && std::abs(point.y()) < farthest_m_ && std::abs(point.z()) < farthest_m_;
+  }
+  Index find_brick(const VoxelCoordinates& brick, BrickCursor& cursor) const {
+    if (brick != cursor.at) cursor = {brick, find_brick(brick)};
+    return cursor.brick;
+  }
+  void add_points_of(const PointCloud& points, InsertReport& report);
+  void add_to(Index voxel, const Eigen::Vector3f& point);
+  void add_to_new_voxel(const Eigen::Vector3f& point, const VoxelCoordinates& voxel, InsertReport& report);
+  void add_voxel(const Eigen::Vector3f& point, const VoxelCoordinates& voxel);
   void follow_ray(const Eigen::Vector3d& sensor, const Eigen::Vector3d& end);
   void count_meeting(Index voxel, std::uint32_t Counts::*kind);
   Index find_voxel(const VoxelCoordinates& voxel) const;
-  /// The cells of for_each_nearby_voxel() that hold something wanted: so many of `found`. The memory is asked for all
-  /// of it before any is waited for.
-  std::size_t find_nearby(Index index, const VoxelCoordinates& cell, const VoxelCoordinates& low,
-                          const VoxelCoordinates& high, std::array<CellVoxels, 27>& found) const;
   Index find_or_add_brick(const VoxelCoordinates& brick);
   Index occupy(const VoxelCoordinates& cell);
   void release(const VoxelCoordinates& cell);
