@@ -151,14 +151,14 @@ class Delays:
             self.late.append((now - came, dict(zip(PARTS, (ready - came, complete - ready, weighted - complete,
                                                            now - weighted)))))
 
-    def report(self):
-        """Delays in milliseconds."""
+    def report(self, factor=1.0):
+        """Delays in milliseconds of wall time; so are the deadlines."""
         with self.lock:
             result = {}
             for name, values, kind in (("odometry to estimate", self.estimates, "odometry"),
                                        ("fix to decision", self.decisions, "fixes")):
                 steps = sorted(self.intervals[kind])
-                deadline = steps[len(steps) // 2] * 1e-9 if steps else math.inf
+                deadline = steps[len(steps) // 2] * 1e-9 / factor if steps else math.inf
                 result[name] = {key: value if key == "count" else 1e3 * value
                                 for key, value in summary(values).items()}
                 result[name].update(deadline=1e3 * deadline, missed=sum(value > deadline for value in values))
@@ -234,7 +234,7 @@ def run(options):
                 process.look(time.monotonic() - begin)
             time.sleep(max(0.0, min(SAMPLE_S, end - time.monotonic())))
         seconds = time.monotonic() - begin
-        return {"wall_s": seconds, "simulated_s": delays.simulated_s(), "delays_ms": delays.report(), "counts": counts,
+        return {"wall_s": seconds, "simulated_s": delays.simulated_s(), "delays_ms": delays.report(options.factor), "counts": counts,
                 "nodes": {process.node.program: process.report(seconds) for process in processes},
                 "ended": {node.program: node.crash() for node in nodes if not node.is_alive()}}
     finally:
