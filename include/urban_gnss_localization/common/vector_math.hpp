@@ -9,7 +9,9 @@
 /// A function with loops over many numbers: built for several widths of the processor's vectors, of which the widest
 /// that it has is chosen at run time. The versions round alike, so every processor gives the same numbers: such a
 /// source file is built without fused multiplication and addition (vector_sources in CMakeLists.txt).
-#if defined(__x86_64__) && defined(__GLIBC__) && defined(__GNUC__) && !defined(__clang__)
+/// Not with sanitizers, which are not ready yet when it is chosen.
+#if defined(__x86_64__) && defined(__GLIBC__) && defined(__GNUC__) && !defined(__clang__) && \
+    !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 #define URBAN_GNSS_VECTORISED __attribute__((target_clones("avx512f", "avx2", "default")))
 #else
 #define URBAN_GNSS_VECTORISED
