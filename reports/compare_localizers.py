@@ -265,7 +265,7 @@ def write_report(options, methods, results, tracks):
     """Figures, page and Markdown; gives the path of the page."""
     title = "What each source of information is worth" if options.ablation else "Localizers on real recordings"
     header, rows = ablate(results) if options.ablation else table(results, methods)
-    page = common.HtmlPage(title)
+    page = common.HtmlPage(title, options.output)
     page.table(header, rows)
     page.paragraph("Median / 95 % / maximum of the horizontal error in metres at the truth's stamps; † diverged: more "
                    "than {:.0f} m for {:.0f} s on end.".format(DIVERGED_M, DIVERGED_S))

@@ -325,7 +325,7 @@ def make_report(out):
     plot_figure7(os.path.join(out, "fig7.png"), {s: truths[s] for s in shown}, estimates)
 
     seeds = metrics.get("seeds", [])
-    page = common.HtmlPage("Occlusion: covariances of fixes and what a UKF makes of them")
+    page = common.HtmlPage("Occlusion: covariances of fixes and what a UKF makes of them", out)
     where = ("on the bag {}.".format(metrics["bag"]) if "bag" in metrics else
              "on simulated scenarios, {} seeds; the figures show seed {}.".format(len(seeds),
                                                                                   seeds[0] if seeds else "–"))

@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""Trajectories, errors over time and error distributions of evaluated runs, and a report of all of them.
+"""The tracks that `evaluate` has found, errors over time and error distributions, and a page of all of them.
 
 usage: plot_evaluation.py DIR
 
-Reads DIR/metrics.json and, for each of its runs, DIR/data/errors_<run>.csv and, if there is one,
-DIR/data/fixes_<run>.csv; a slash in the name of a run is an underscore in file names. Runs are named
-<data set>/<method>. Writes trajectory_<run>.png and errors_<run>.png for each run, cdf.png and
-report.html into DIR.
+Reads DIR/metrics.json; for each of its tracks DIR/data/track_<track>.json; for each of its runs, those with a truth,
+DIR/data/errors_<run>.csv and, if there is one, DIR/data/fixes_<run>.csv. A slash in a name is an underscore in file
+names. Runs are named <bag>/<topic>. Writes overview.png, trajectory_<run>.png and errors_<run>.png for each run,
+cdf.png and report.html into DIR. The page needs no other file, and no network.
 """
 
 import os
@@ -18,6 +18,7 @@ sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import numpy as np  # noqa: E402
 
 import report_common as common  # noqa: E402
+import track_view  # noqa: E402
 from report_common import plt  # noqa: E402
 
 ERROR_COLUMNS = ("t", "position_error_m", "heading_error_rad", "est_x", "est_y", "truth_x", "truth_y",
@@ -27,17 +28,22 @@ FIX_COLUMNS = ("t", "fix_x", "fix_y", "error_m")
 SMALLEST_MARGIN_M = 15.0
 RELATIVE_MARGIN = 0.15
 SMALLEST_ERROR_M = 1e-3
+OVERVIEW_LEAST_M = 0.1
 LONGEST_GAP_S = 5.0
+FIX_TOPICS = ("fix", "fix_weighted")
+USUAL_TOPICS = (("/odometry/filtered", ""), ("/gps/fix", ": raw fix"), ("/gps/fix_weighted", ": weighted fix"))
+TRACK_COLOURS = ("#0072b2", "#7b4fd6", "#56b4e9", "#8c510a", "#f781bf", "#1f3a93")  # none of a decision's
+USED = ("accepted", "inflated", "bias_compensated")  # decisions
 
 
 class Run:
-    """The data of one run; `group` is its name up to the last slash, `method` the rest."""
+    """The data of one run; `label` is its name for people."""
 
     def __init__(self, directory, name, metrics):
         self.name = name
         self.metrics = metrics
         self.file_name = name.replace("/", "_")
-        self.group, _, self.method = name.rpartition("/")
+        self.label, self.is_fix = label_of(name), name.rpartition("/")[2] in FIX_TOPICS
         data = os.path.join(directory, "data")
         self.errors = common.read_csv(os.path.join(data, "errors_" + self.file_name + ".csv"), ERROR_COLUMNS)
         self.fixes = common.read_optional_csv(os.path.join(data, "fixes_" + self.file_name + ".csv"),
@@ -48,11 +54,19 @@ class Run:
         return self.fixes is not None and len(self.fixes) > 0
 
 
+def label_of(name):
+    """The bag's stem where the topic is the usual one, with "raw fix" behind it where that is a fix's."""
+    for end, replaced in USUAL_TOPICS:
+        if name.endswith(end):
+            return name[:-len(end)] + replaced
+    return name
+
+
 def read_runs(directory, metrics, path):
     """The runs of metrics.json, in its order; no two may share their files."""
     runs = []
     owners = {}
-    for name, values in common.require_object(metrics, "runs", path).items():
+    for name, values in metrics.get("runs", {}).items():
         run = Run(directory, name, values)
         if run.file_name in owners:
             raise common.ReportError("{}: runs {} and {} have the same file names".format(
@@ -62,10 +76,15 @@ def read_runs(directory, metrics, path):
     return runs
 
 
-def run_colours(runs):
-    """A colour for each run: that of its method."""
-    colours = common.method_colours(list(dict.fromkeys(run.method for run in runs)))
-    return {run.name: colours[run.method] for run in runs}
+def run_colours(runs, tracks=()):
+    """A colour for each run and track: that of a method of this name, or the next free one."""
+    free = iter(TRACK_COLOURS * (1 + (len(tracks) + len(runs)) // len(TRACK_COLOURS)))
+    colours = {run.name: common.FIX_COLOUR for run in runs if run.is_fix}
+    for name in [run.name for run in runs] + list(tracks):
+        if name not in colours:
+            known = [part for part in name.split("/") if part in common.METHOD_COLOURS]
+            colours[name] = common.METHOD_COLOURS[known[0]] if known else next(free)
+    return colours
 
 
 def break_gaps(t, *columns):
@@ -119,20 +138,21 @@ def plot_trajectory(path, run, colour):
                                                    errors["est_x"], errors["est_y"])
     axes.plot(truth_x, truth_y, color=common.TRUTH_COLOUR, linewidth=1.6, marker=marker_for(truth_x),
               label="truth")
-    axes.plot(est_x, est_y, color=colour, linewidth=1.3, marker=marker_for(est_x), label="estimate")
-    notes.append((count_outside(errors["est_x"], errors["est_y"], limits), len(errors), "estimates"))
+    if not run.is_fix:
+        axes.plot(est_x, est_y, color=colour, linewidth=1.3, marker=marker_for(est_x), label="estimate")
+        notes.append((count_outside(errors["est_x"], errors["est_y"], limits), len(errors), "estimates"))
     axes.set_aspect("equal")
     axes.set_xlim(limits[0], limits[1])
     axes.set_ylim(limits[2], limits[3])
-    axes.set_xlabel("x [m]")
-    axes.set_ylabel("y [m]")
-    axes.set_title(run.name, fontsize=11)
+    axes.set_xlabel("east [m]")
+    axes.set_ylabel("north [m]")
+    axes.set_title("Where {} was".format(run.label), fontsize=11)
     common.light_grid(axes)
     common.legend_beside(axes)
     common.save_figure(figure, path)
     outside = ["{} of {} {}".format(count, total, what) for count, total, what in notes if count]
     return "Trajectory of {}.{}".format(
-        run.name, " Outside the view: {}.".format(" and ".join(outside)) if outside else "")
+        run.label, " Outside the view: {}.".format(" and ".join(outside)) if outside else "")
 
 
 def plot_errors(path, run, colour):
@@ -148,7 +168,7 @@ def plot_errors(path, run, colour):
     known = common.finite(position)
     top.set_ylim(0.0, 1.05 * max(np.max(known), SMALLEST_ERROR_M) if len(known) else 1.0)
     top.set_ylabel("position error [m]")
-    top.set_title(run.name, fontsize=11)
+    top.set_title("How far off {} was".format(run.label), fontsize=11)
     bottom.axhline(0.0, color="#888888", linewidth=0.8)
     bottom.plot(t, common.line_degrees(heading), color=colour, linewidth=1.0, marker=marker_for(t))
     bottom.set_ylabel("heading error [deg]")
@@ -178,25 +198,6 @@ def distinct_fixes(runs):
     return distinct
 
 
-def draw_distributions(axes, runs, colours):
-    """The distributions of the position errors of a group of runs, and of their raw fixes."""
-    for run in runs:
-        values, share = distribution(run.errors["position_error_m"])
-        axes.plot(values, share, drawstyle="steps-post", color=colours[run.name], linewidth=1.6,
-                  label=run.method)
-    sources = distinct_fixes(runs)
-    for run in sources:
-        values, share = distribution(run.fixes["error_m"])
-        alone = len(sources) == 1
-        axes.plot(values, share, drawstyle="steps-post", linestyle="--", linewidth=1.3,
-                  color="#777777" if alone else colours[run.name],
-                  label="raw fixes" if alone else "raw fixes, " + run.method)
-    axes.set_xscale("log")
-    axes.set_ylim(0.0, 1.02)
-    common.plain_ticks(axes.xaxis)
-    common.light_grid(axes)
-
-
 def lower_end(runs):
     """Where the axis of errors begins: the smallest 1 % quantile of all runs; none without data."""
     samples = [common.finite(run.errors["position_error_m"]) for run in runs]
@@ -204,29 +205,67 @@ def lower_end(runs):
     return 0.9 * max(min(quantiles), SMALLEST_ERROR_M) if quantiles else None
 
 
+def raw_fixes(runs):
+    """(label, series of fixes) of each set of raw fixes, once."""
+    sources = distinct_fixes(runs)
+    return [("raw fix" if len(sources) == 1 else "raw fix, " + run.label, run.fixes) for run in sources]
+
+
 def plot_distributions(path, runs, colours):
-    """The distributions of the position errors: one panel for each group of runs."""
-    groups = list(dict.fromkeys(run.group for run in runs))
-    columns = min(2, len(groups))
-    rows = (len(groups) + columns - 1) // columns
-    figure, grid = plt.subplots(rows, columns, squeeze=False, sharex=True, sharey=True,
-                                figsize=(7.5 if columns == 1 else 12.5, 4.4 * rows))
-    handles = {}
-    for axes, group in zip(grid.ravel(), groups):
-        draw_distributions(axes, [run for run in runs if run.group == group], colours)
-        axes.set_title(group, fontsize=11)
-        axes.tick_params(labelbottom=True)
-        for handle, label in zip(*axes.get_legend_handles_labels()):
-            handles.setdefault(label, handle)
-    for axes in grid.ravel()[len(groups):]:
-        axes.set_axis_off()
-    for axes in grid[:, 0]:
-        axes.set_ylabel("share of errors up to x")
-    for axes in grid.ravel()[max(0, len(groups) - columns):len(groups)]:
-        axes.set_xlabel("position error [m]")
-    grid[0, 0].set_xlim(left=lower_end(runs))
-    common.legend_beside(grid[0, -1], handles=list(handles.values()), labels=list(handles))
-    figure.subplots_adjust(hspace=0.25, wspace=0.06)
+    """The distributions of the position errors, and of the raw fixes'."""
+    figure, axes = plt.subplots(figsize=(8.5, 4.6))
+    for run in runs:
+        if run.is_fix and run.has_fixes():
+            continue
+        values, share = distribution(run.errors["position_error_m"])
+        axes.plot(values, share, drawstyle="steps-post", color=colours[run.name], linewidth=1.6, label=run.label)
+    for style, (label, fixes) in zip(("--", ":", "-.") * len(runs), raw_fixes(runs)):
+        values, share = distribution(fixes["error_m"])
+        axes.plot(values, share, drawstyle="steps-post", linestyle=style, linewidth=1.3, color="#777777", label=label)
+    axes.set_xscale("log")
+    axes.set_xlim(left=lower_end(runs))
+    axes.set_ylim(0.0, 1.02)
+    common.plain_ticks(axes.xaxis)
+    common.light_grid(axes)
+    axes.set_ylabel("share of the time with a smaller error")
+    axes.set_xlabel("position error [m]")
+    common.legend_beside(axes)
+    common.save_figure(figure, path)
+
+
+def plot_overview(path, runs, colours, title):
+    """All runs and the raw fixes: a map beside the errors over time."""
+    shown = [run for run in runs if not run.is_fix] or runs
+    figure, (left, right) = plt.subplots(1, 2, figsize=(13.0, 5.0), gridspec_kw={"width_ratios": (1.0, 1.4)})
+    start = min((run.errors["t"][0] for run in shown if len(run.errors)), default=0.0)
+    for label, fixes in raw_fixes(runs):
+        left.plot(fixes["fix_x"], fixes["fix_y"], ".", color=common.FIX_COLOUR, markersize=2.5)
+        right.plot(fixes["t"] - start, np.maximum(fixes["error_m"], OVERVIEW_LEAST_M), ".", color=common.FIX_COLOUR,
+                   markersize=2.5, label=label)
+    longest = max(shown, key=lambda run: len(run.errors))
+    t, truth_x, truth_y = break_gaps(longest.errors["t"], longest.errors["truth_x"], longest.errors["truth_y"])
+    left.plot(truth_x, truth_y, color=common.TRUTH_COLOUR, linewidth=2.0)
+    for run in shown:
+        t, x, y, error = break_gaps(run.errors["t"] - start, run.errors["est_x"], run.errors["est_y"],
+                                    run.errors["position_error_m"])
+        left.plot(x, y, color=colours[run.name], linewidth=1.1)
+        right.plot(t, np.maximum(error, OVERVIEW_LEAST_M), color=colours[run.name], linewidth=1.2, label=run.label)
+    right.plot([], [], color=common.TRUTH_COLOUR, linewidth=2.0, label="truth")
+    limits = view_limits(longest.errors)
+    if limits:
+        left.set_xlim(limits[0], limits[1])
+        left.set_ylim(limits[2], limits[3])
+    left.set_aspect("equal", adjustable="datalim")
+    left.set_xlabel("east [m]")
+    left.set_ylabel("north [m]")
+    right.set_yscale("log")
+    common.plain_ticks(right.yaxis)
+    right.set_xlabel("time [s]")
+    right.set_ylabel("position error [m]")
+    for axes in (left, right):
+        common.light_grid(axes)
+    figure.suptitle(title, fontsize=12)
+    common.legend_beside(right)
     common.save_figure(figure, path)
 
 
@@ -238,7 +277,7 @@ def position_row(run):
     """Position errors of one run as text."""
     def cell(*keys, digits=2, scale=1.0):
         return common.format_number(scale * common.number(run.metrics, *keys), digits)
-    return ((run.name, cell("samples", digits=0), cell("coverage", digits=1, scale=100.0))
+    return ((run.label, cell("samples", digits=0), cell("coverage", digits=1, scale=100.0))
             + tuple(cell("position_m", statistic) for statistic in STATISTICS)
             + (cell("share_below_5m", digits=1, scale=100.0), cell("share_below_10m", digits=1, scale=100.0),
                cell("nees_mean")))
@@ -247,7 +286,7 @@ def position_row(run):
 def heading_row(run):
     """Heading errors of one run in degrees as text."""
     degrees = 180.0 / np.pi
-    return (run.name,) + tuple(
+    return (run.label,) + tuple(
         common.format_number(degrees * common.number(run.metrics, "heading_rad", statistic))
         for statistic in STATISTICS)
 
@@ -265,30 +304,90 @@ def add_tables(page, runs, colours):
     page.table(("run",) + STATISTIC_LABELS, [heading_row(run) for run in runs], colours)
 
 
-def make_report(directory):
-    """Make all figures and the page; gives the path of the page."""
-    metrics_path = os.path.join(directory, "metrics.json")
-    metrics = common.read_json(metrics_path)
-    runs = read_runs(directory, metrics, metrics_path)
-    colours = run_colours(runs)
+def read_tracks(directory, metrics):
+    """What the page draws of each track, in the order of metrics.json."""
+    return [track_view.read_track(os.path.join(directory, "data", "track_" + name.replace("/", "_") + ".json"))
+            for name in metrics.get("tracks", {})]
 
-    def output(name):
-        return os.path.join(directory, name)
 
-    page = common.HtmlPage("Evaluation against the truth")
-    add_tables(page, runs, colours)
+# Quantity, keys, digits, factor.
+TRACK_ROWS = (("time [s]", ("duration_s",), 1, 1.0), ("way [m]", ("distance_m",), 0, 1.0),
+              ("claimed \u03c3, median [m]", ("sigma_m", "median"), 2, 1.0),
+              ("claimed \u03c3, 95 % [m]", ("sigma_m", "p95"), 2, 1.0),
+              ("speed, mean [m/s]", ("speed_mps", "mean"), 1, 1.0), ("speed, max [m/s]", ("speed_mps", "max"), 1, 1.0),
+              ("gaps of the estimate", ("gaps",), 0, 1.0), ("the longest [s]", ("longest_gap_s",), 1, 1.0),
+              ("fixes", ("fixes",), 0, 1.0), ("of them used [%]", ("used_share",), 1, 100.0),
+              ("longest time without a used fix [s]", ("longest_gap_of_fixes_s",), 1, 1.0),
+              ("NIS, median", ("nis", "median"), 2, 1.0), ("NIS above its threshold [%]", ("nis_above_threshold",), 1, 100.0),
+              ("healthy [% of the time]", ("healthy_share",), 1, 100.0))
+
+
+def used_share(decisions):
+    """The share of the fixes with a decision that were used; NaN without one."""
+    judged = sum(count for decision, count in decisions.items() if decision != "unknown")
+    return sum(decisions.get(decision, 0) for decision in USED) / judged if judged else float("nan")
+
+
+def track_table(tracks):
+    """Header and rows: what is known of each track, a column each."""
+    known = {name: dict(track, used_share=used_share(track.get("decisions", {}))) for name, track in tracks.items()}
+    rows = [[label] + [common.format_number(factor * common.number(track, *keys), digits) for track in known.values()]
+            for label, keys, digits, factor in TRACK_ROWS]
+    return ["track"] + list(known), rows
+
+
+def add_track_part(page, tracks, metrics, colours):
+    """The map, and a table of what is known without a truth."""
+    track_view.add_tracks(page, tracks, colours)
+    page.table(*track_table(metrics["tracks"]))
+    page.paragraph("\u03c3: of the position, along the worse direction. NIS: squared innovation of a fix in units of its "
+                   "expected covariance.")
+
+
+def pictured(runs):
+    """The runs with pictures of their own: not the raw fixes, which are in those of the estimates."""
+    return [run for run in runs if not run.is_fix] or runs
+
+
+def add_error_part(page, runs, colours, output):
+    """Tables, distributions and pictures of runs with a truth."""
+    by_label = {run.label: colours[run.name] for run in runs}
+    plot_overview(output("overview.png"), runs, colours, "Where the robot was, and how far off")
+    page.image("overview.png", "Left: map. Right: position errors over time (logarithmic, cut at {:g} m).".format(
+        OVERVIEW_LEAST_M))
+    add_tables(page, runs, by_label)
     page.heading("Distribution of the position errors")
     plot_distributions(output("cdf.png"), runs, colours)
-    page.image("cdf.png", "Share of the position errors up to a value (logarithmic); dashed: the raw fixes.")
-    for run in runs:
-        page.heading(run.name)
+    page.image("cdf.png", "Share of the position errors up to a value (logarithmic); grey: the raw fixes.")
+    for run in pictured(runs):
+        page.heading(run.label)
         if not len(run.errors):
             page.paragraph("This run has no samples.")
         trajectory, errors = "trajectory_" + run.file_name + ".png", "errors_" + run.file_name + ".png"
         page.image(trajectory, plot_trajectory(output(trajectory), run, colours[run.name]))
         plot_errors(output(errors), run, colours[run.name])
         page.image(errors, "Position error with the estimate's own 1 \u03c3 (shaded), and heading error.")
-    page.provenance(metrics, without=("runs",))
+
+
+def make_report(directory):
+    """Make all figures and the page; gives the path of the page."""
+    metrics_path = os.path.join(directory, "metrics.json")
+    metrics = common.read_json(metrics_path)
+    runs = read_runs(directory, metrics, metrics_path)
+    tracks = read_tracks(directory, metrics)
+    if not runs and not tracks:
+        raise common.ReportError("{}: neither runs nor tracks".format(metrics_path))
+    colours = run_colours(runs, metrics.get("tracks", {}))
+
+    def output(name):
+        return os.path.join(directory, name)
+
+    page = common.HtmlPage("Evaluation against the truth" if runs else "Tracks", directory)
+    if tracks:
+        add_track_part(page, tracks, metrics, colours)
+    if runs:
+        add_error_part(page, runs, colours, output)
+    page.provenance(metrics, without=("runs", "tracks"))
     page.save(output("report.html"))
     return output("report.html")
 

@@ -5,7 +5,7 @@ usage: plot_paper_experiment.py DIR
 
 Reads DIR/metrics.json and, in DIR/data, targets.csv and for each method trajectory_<method>.csv,
 snapshots_<method>.csv with particles_<method>.csv, and errors_over_seeds_<method>.csv (each optional for a
-single method). Writes fig7_particles.png, fig8_trajectories.png, fig9_errors.png, errors_over_seeds.png,
+single method). If DIR/city holds what `evaluate` wrote of a drive, the page begins with it. Writes fig7_particles.png, fig8_trajectories.png, fig9_errors.png, errors_over_seeds.png,
 summary.png and report.html into DIR.
 """
 
@@ -18,13 +18,17 @@ sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import numpy as np  # noqa: E402
 from matplotlib.ticker import MultipleLocator  # noqa: E402
 
+import plot_evaluation  # noqa: E402
 import report_common as common  # noqa: E402
 from report_common import plt  # noqa: E402
 
-PREFERRED_PANELS = ("paper", "conventional", "literal", "oracle")
+PREFERRED_PANELS = ("paper", "switching", "conventional", "literal", "oracle")
 MAX_PANELS = 4
 VIEW_MARGIN_M = 12.0
-SNAPSHOT_HALF_WIDTH_M = 8.0
+CITY = "city"
+SNAPSHOT_HALF_WIDTHS_M = (8.0, 16.0, 32.0)  # the first that shows most of a panel
+SHOWN_SHARE = 0.9  # of the particles
+MEDIAN_S = 0.5  # of figure 9
 SMALLEST_ERROR_M = 1e-3
 
 # Figure 7 only: its estimate and fix are single marks on top of coloured particles.
@@ -62,8 +66,23 @@ def without(methods, tables):
     return " No data for: {}.".format(name_list(absent)) if absent else ""
 
 
+def distance_from_truth(state, x, y):
+    """Along the axis on which it is larger."""
+    return np.maximum(abs(x - state["true_x"]), abs(y - state["true_y"]))
+
+
+def half_width(state, particles):
+    """Of the window around the truth that shows estimate, fix and most particles, if one does."""
+    wanted = [distance_from_truth(state, state[name + "_x"], state[name + "_y"]) for name in ("est", "fix")]
+    if len(particles):
+        wanted.append(np.quantile(distance_from_truth(state, particles["x"], particles["y"]), SHOWN_SHARE))
+    fitting = [width for width in SNAPSHOT_HALF_WIDTHS_M if width > 1.05 * np.nanmax(wanted)]
+    return fitting[0] if fitting else SNAPSHOT_HALF_WIDTHS_M[-1]
+
+
 def draw_snapshot(axes, state, particles):
     """One panel of figure 7; gives the coloured particles for the colour bar."""
+    width = half_width(state, particles)
     axes.axvspan(-1e4, 0.0, color=common.SHADOW_COLOUR, zorder=0)
     weight = particles["weight"]
     largest = np.max(weight) if len(weight) and np.max(weight) > 0.0 else 1.0
@@ -74,26 +93,27 @@ def draw_snapshot(axes, state, particles):
         axes.add_patch(plt.Circle((state["est_x"], state["est_y"]), state["radius"], fill=False,
                                   color=ESTIMATE_COLOUR, linewidth=1.2, linestyle="--", zorder=3))
     axes.quiver(state["true_x"], state["true_y"], np.cos(state["true_yaw"]), np.sin(state["true_yaw"]),
-                angles="xy", scale_units="xy", scale=0.4, width=0.012, color=common.TRUTH_COLOUR, zorder=5)
+                angles="xy", scale_units="xy", scale=0.4 * SNAPSHOT_HALF_WIDTHS_M[0] / width, width=0.012, color=common.TRUTH_COLOUR, zorder=5)
     axes.plot(state["est_x"], state["est_y"], "o", color=ESTIMATE_COLOUR, markeredgecolor="white",
               markersize=7, zorder=6)
     axes.plot(state["fix_x"], state["fix_y"], "X", color=FIX_COLOUR, markeredgecolor="white",
               markersize=8, zorder=4)
 
     axes.set_aspect("equal")
-    axes.xaxis.set_major_locator(MultipleLocator(5.0))
-    axes.yaxis.set_major_locator(MultipleLocator(5.0))
-    axes.set_xlim(state["true_x"] - SNAPSHOT_HALF_WIDTH_M, state["true_x"] + SNAPSHOT_HALF_WIDTH_M)
-    axes.set_ylim(state["true_y"] - SNAPSHOT_HALF_WIDTH_M, state["true_y"] + SNAPSHOT_HALF_WIDTH_M)
-    note_what_is_outside(axes, state, particles)
+    step = 5.0 * width / SNAPSHOT_HALF_WIDTHS_M[0]
+    axes.xaxis.set_major_locator(MultipleLocator(step))
+    axes.yaxis.set_major_locator(MultipleLocator(step))
+    axes.set_xlim(state["true_x"] - width, state["true_x"] + width)
+    axes.set_ylim(state["true_y"] - width, state["true_y"] + width)
+    note_what_is_outside(axes, state, particles, width)
     common.light_grid(axes)
     return points
 
 
-def note_what_is_outside(axes, state, particles):
-    """Say in the panel what its window does not show."""
+def note_what_is_outside(axes, state, particles, width):
+    """Say in the panel what its window of this half width does not show."""
     def is_outside(x, y):
-        return np.maximum(abs(x - state["true_x"]), abs(y - state["true_y"])) > SNAPSHOT_HALF_WIDTH_M
+        return distance_from_truth(state, x, y) > width
     outside = [name for name in ("estimate", "fix")
                if is_outside(state[name[:3] + "_x"], state[name[:3] + "_y"])]
     lost = int(np.sum(is_outside(particles["x"], particles["y"])))
@@ -133,7 +153,7 @@ def plot_figure7(path, snapshots, particles):
         for axes, state in zip(row, snapshots[method]):
             own = particles[method][particles[method]["snapshot"] == state["snapshot"]]
             points = draw_snapshot(axes, state, own)
-            axes.set_title("{}, t = {:.2f} s".format(method, state["t"]), fontsize=10)
+            axes.set_title("{} after {:.1f} s".format(method, state["t"]), fontsize=10)
         for axes in row[len(snapshots[method]):]:
             axes.set_axis_off()
         row[0].set_ylabel("y [m]")
@@ -269,8 +289,18 @@ def heading_axis(axes):
     axes.set_ylim(max(min(low, -3.5), -250.0), min(max(high, 3.5), 250.0))
 
 
-def plot_figure9(path, trajectories, colours):
+def running_median(t, values, seconds):
+    """Of a window about each sample, which shows lines that noise would hide. Angles must not wrap within it."""
+    if len(t) < 3:
+        return values
+    half = int(0.5 * seconds / max(float(np.median(np.diff(t))), 1e-6))
+    padded = np.pad(np.asarray(values, dtype=float), half, mode="edge")
+    return np.median(np.lib.stride_tricks.sliding_window_view(padded, 2 * half + 1), axis=1)
+
+
+def plot_figure9(path, all_trajectories, colours):
     """Position and heading error of one seed over time; gives the sentences for the caption."""
+    trajectories = {method: all_trajectories[method] for method in choose_panels(list(all_trajectories))}
     figure, (top, bottom) = plt.subplots(2, 1, sharex=True, figsize=(10.5, 7.0))
     end = end_of_time_axis(trajectories)
     first = next(iter(trajectories))
@@ -281,9 +311,10 @@ def plot_figure9(path, trajectories, colours):
         above = 3.0 - 0.01 * depth
         position = np.hypot(rows["est_x"] - rows["true_x"], rows["est_y"] - rows["true_y"])
         heading = common.line_degrees(rows["est_yaw"] - rows["true_yaw"])
-        top.plot(rows["t"], np.maximum(position, SMALLEST_ERROR_M), color=colours[method], linewidth=1.0,
-                 zorder=above, label=method)
-        bottom.plot(rows["t"], heading, color=colours[method], linewidth=0.9, zorder=above)
+        top.plot(rows["t"], np.maximum(running_median(rows["t"], position, MEDIAN_S), SMALLEST_ERROR_M),
+                 color=colours[method], linewidth=1.5, zorder=above, label=method)
+        bottom.plot(rows["t"], running_median(rows["t"], heading, MEDIAN_S), color=colours[method], linewidth=1.3,
+                    zorder=above)
     top.set_yscale("log")
     common.plain_ticks(top.yaxis)
     top.set_ylabel("position error [m]")
@@ -296,8 +327,11 @@ def plot_figure9(path, trajectories, colours):
     common.save_figure(figure, path)
 
     caption = ("Error of the position (logarithmic) and of the heading (linear within \u00b12 degrees, "
-               "logarithmic beyond) of the same seed over time, as the paper's Fig. 9. Shaded: {} is in the "
-               "shadow; the other methods drive their own way and reach it at their own times.".format(first))
+               "logarithmic beyond) of the same seed over time, as the paper's Fig. 9; medians over {:g} s. Shaded: "
+               "{} is in the shadow; the other methods drive their own way and reach it at their own times.".format(
+                   MEDIAN_S, first))
+    if len(trajectories) < len(all_trajectories):
+        caption += " Not drawn: {}.".format(name_list([m for m in all_trajectories if m not in trajectories]))
     longer = [method for method, rows in trajectories.items() if np.max(rows["t"]) > end]
     if longer:
         caption += " The time axis ends at {:.0f} s; longer runs: {}.".format(end, name_list(longer))
@@ -412,6 +446,28 @@ def in_order(methods, order):
     return {name: methods[name] for name in known + [name for name in methods if name not in known]}
 
 
+def add_city(page, directory):
+    """A drive through a simulated city, where demo.sh has made one: the first screen."""
+    path = os.path.join(directory, CITY, "metrics.json")
+    if not os.path.exists(path):
+        return
+    runs = common.require_object(common.read_json(path), "runs", path)
+    rows = []
+    for name, run in runs.items():
+        label = plot_evaluation.label_of(name)
+        if label.endswith(": raw fix"):
+            if any(row[0] == "raw fix" for row in rows):
+                continue
+            label = "raw fix"
+        rows.append((label,) + tuple(common.format_number(common.number(run, "position_m", key))
+                                     for key in ("median", "p95", "max")))
+    page.heading("A drive through a simulated city")
+    page.image(CITY + "/overview.png", "The recommended localizer imm_ekf beside a plain EKF and the raw fix, on the same "
+               "odometry, IMU and receiver. With a map that can be zoomed: {}/report.html.".format(CITY))
+    page.table(("position error [m]", "median", "95 %", "max"), sorted(rows, key=lambda row: row[0] == "raw fix"))
+    page.heading("The paper's field")
+
+
 def make_report(directory):
     """Make all figures and the page; gives the path of the page."""
     metrics_path = os.path.join(directory, "metrics.json")
@@ -432,7 +488,8 @@ def make_report(directory):
     def output(name):
         return os.path.join(directory, name)
 
-    page = common.HtmlPage("The experiment of Nishida et al. (2013)")
+    page = common.HtmlPage("The experiment of Nishida et al. (2013)", directory)
+    add_city(page, directory)
     page.paragraph(introduction(metrics))
     page.heading("Results")
     page.table(TABLE_HEADER, [table_row(name, method) for name, method in methods.items()], colours)
@@ -446,9 +503,9 @@ def make_report(directory):
     page.heading("Fig. 7: particles")
     if plot_figure7(output("fig7_particles.png"), snapshots, particles):
         page.image("fig7_particles.png",
-                   "Particles around the true state at a few instants, as the paper's Fig. 7, in a window of "
-                   "\u00b1{:g} m around the truth. In the shadow the paper's filter expects the fix at the "
-                   "distance r\u0302 from the robot.".format(SNAPSHOT_HALF_WIDTH_M))
+                   "Particles around the true state at a few instants, as the paper's Fig. 7, in windows around the "
+                   "truth of \u00b1{:g} m or more. In the shadow the paper's filter expects the fix at the "
+                   "distance r\u0302 from the robot.".format(SNAPSHOT_HALF_WIDTHS_M[0]))
     else:
         page.paragraph("No method has snapshots of its particles.")
 

@@ -4,12 +4,12 @@
 The scripts read plain CSV and JSON and write PNG and HTML: no ROS, no network, numpy and matplotlib only.
 """
 
+import base64
 import html
 import json
 import os
 import re
 import sys
-from urllib.parse import quote
 
 import matplotlib
 
@@ -35,6 +35,7 @@ METHOD_COLOURS = {
     "literal": "#aa3377",
     "switching": "#009e73",
     "imm": "#56b4e9",
+    "imm_ekf": "#56b4e9",
     "ekf": "#e69f00",
     "dead_reckoning": "#8a8a8a",
     "oracle": "#7b4fd6",
@@ -43,15 +44,19 @@ METHOD_COLOURS = {
 OTHER_COLOURS = ("#f781bf", "#7f9c00", "#1f3a93", "#17becf", "#843c39", "#c49c00", "#3b7a57", "#b39ddb",
                  "#ff7f0e")
 
-STYLE = """
+# Of every page, those of the doctor too.
+BASIC_STYLE = """
 body { font-family: sans-serif; color: #222; max-width: 75em; margin: 2em auto; padding: 0 1em; }
 h1 { font-size: 1.6em; } h2 { font-size: 1.25em; margin-top: 2em; border-bottom: 1px solid #ccc; }
 table { border-collapse: collapse; margin: 1em 0; font-size: 0.92em; }
+img { max-width: 100%; height: auto; }
+"""
+STYLE = BASIC_STYLE + """
 th, td { padding: 0.3em 0.8em; border-bottom: 1px solid #ddd; text-align: right; white-space: nowrap; }
 th { border-bottom: 2px solid #888; vertical-align: bottom; }
 th:first-child, td:first-child { text-align: left; }
 .swatch { display: inline-block; width: 0.8em; height: 0.8em; margin-right: 0.5em; border-radius: 2px; }
-figure { margin: 1.5em 0; } figure img { max-width: 100%; height: auto; }
+figure { margin: 1.5em 0; }
 figcaption { color: #444; font-size: 0.92em; max-width: 60em; }
 pre { background: #f5f5f5; padding: 0.8em; overflow-x: auto; font-size: 0.88em; }
 """
@@ -220,10 +225,18 @@ def format_json(content):
     return re.sub(r"\[[^\[\]{}\"]*\]", lambda match: " ".join(match.group().split()), text)
 
 
-class HtmlPage:
-    """A page that needs no other file than the pictures beside it. All text is escaped."""
+def image_tag(png, name):
+    """A picture within a page."""
+    return '<img src="data:image/png;base64,{}" alt="{}">'.format(base64.b64encode(png).decode(),
+                                                                 html.escape(name, quote=True))
 
-    def __init__(self, title):
+
+class HtmlPage:
+    """A page that needs no other file: its pictures are in it. All text is escaped."""
+
+    def __init__(self, title, directory):
+        """`directory` is that of the pictures."""
+        self._directory = directory
         self._title = html.escape(title)
         self._parts = ["<h1>{}</h1>".format(self._title)]
 
@@ -251,9 +264,18 @@ class HtmlPage:
         self._parts.append("\n".join(lines + ["</tbody>", "</table>"]))
 
     def image(self, file_name, caption):
-        """A picture in the directory of the page."""
-        self._parts.append('<figure><img src="{}" alt="{}">\n<figcaption>{}</figcaption></figure>'.format(
-            quote(file_name), html.escape(caption, quote=True), html.escape(caption)))
+        """A PNG of the pictures' directory."""
+        path = os.path.join(self._directory, file_name)
+        try:
+            with open(path, "rb") as stream:
+                picture = image_tag(stream.read(), file_name)
+        except OSError as error:
+            raise ReportError("{}: {}".format(path, error.strerror))
+        self._parts.append("<figure>{}\n<figcaption>{}</figcaption></figure>".format(picture, html.escape(caption)))
+
+    def fragment(self, markup):
+        """HTML as it is."""
+        self._parts.append(markup)
 
     def listing(self, content):
         """Parameters or a command, as they are; anything but a string is written as JSON."""

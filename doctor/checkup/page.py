@@ -1,10 +1,10 @@
 """The report as one HTML file, with its plots inside."""
 
-import base64
 import html
 import io
 
 import numpy as np
+from report_common import BASIC_STYLE, image_tag, plt
 
 from . import fits, signals
 from .finding import family
@@ -19,10 +19,8 @@ RATE_COLOURS = dict(COLOURS, velocity="#cc79a7", satellites="#009e73")  # of the
 LEVEL_COLOURS = {"WARN": "#e6b800", "FAIL": "#c1121f"}
 BIN_S = 5.0            # of the messages' rates
 LEAST_SHOWN = 0.004    # of the whole time: the width of a shorter mark
-STYLE = """
-body { font-family: sans-serif; color: #222; max-width: 70em; margin: 2em auto; padding: 0 1em; }
-h1 { font-size: 1.5em; } h2 { font-size: 1.2em; margin-top: 1.8em; border-bottom: 1px solid #ccc; }
-table { border-collapse: collapse; width: 100%; font-size: 0.92em; }
+STYLE = BASIC_STYLE + """
+table { width: 100%; }
 td { padding: 0.3em 0.6em; border-bottom: 1px solid #e4e4e4; vertical-align: top; }
 td.level { font-weight: bold; width: 3.5em; }
 code { display: block; color: #333; background: #f5f5f5; padding: 0.1em 0.4em; }
@@ -37,12 +35,12 @@ def thin(*columns):
     return [column[::step] for column in columns]
 
 
-def embedded(figure, plt):
+def embedded(figure):
     """An image tag with the picture in it."""
     stream = io.BytesIO()
     figure.savefig(stream, dpi=DPI, format="png", bbox_inches="tight", facecolor="white")
     plt.close(figure)
-    return '<img alt="plot" src="data:image/png;base64,{}">'.format(base64.b64encode(stream.getvalue()).decode())
+    return image_tag(stream.getvalue(), "plot")
 
 
 def plot_tracks(axes, evidence):
@@ -145,16 +143,12 @@ def mark_times(all_axes, recording, findings):
 
 def plots(evidence, findings):
     """The figures as image tags."""
-    import matplotlib
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
     recording = evidence.recording
     parts = []
     figure, axes = plt.subplots(figsize=(WIDTH_IN, 6.5))
     plot_tracks(axes, evidence)
     finish(axes)
-    parts.append(("Tracks", embedded(figure, plt)))
+    parts.append(("Tracks", embedded(figure)))
     marked = timed(findings)
     heights = [1.0, 1.0, 1.0] + ([0.1 * (1 + len({finding.check for finding in marked}))] if marked else [])
     figure, all_axes = plt.subplots(len(heights), 1, figsize=(WIDTH_IN, 2.8 * sum(heights)), sharex=True,
@@ -168,7 +162,7 @@ def plots(evidence, findings):
     all_axes[-1].set_xlabel("time [s]")
     for axes in all_axes:
         finish(axes)
-    parts.append(("Speeds, yaw rates, messages" + (", times of findings" if marked else ""), embedded(figure, plt)))
+    parts.append(("Speeds, yaw rates, messages" + (", times of findings" if marked else ""), embedded(figure)))
     return parts
 
 

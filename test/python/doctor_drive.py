@@ -5,7 +5,8 @@ import sys
 
 import numpy as np
 
-sys.path.insert(0, os.path.join(os.path.dirname(os.path.realpath(__file__)), "..", "..", "doctor"))
+HERE = os.path.dirname(os.path.realpath(__file__))
+sys.path[:0] = [os.path.join(HERE, "..", "..", folder) for folder in ("doctor", "reports")]
 from checkup import checks, setup  # noqa: E402
 from checkup.recording import COLUMNS, Recording, Stream, Topic, Transforms  # noqa: E402
 

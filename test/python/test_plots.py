@@ -3,6 +3,8 @@
 
 import json
 import os
+import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -119,6 +121,34 @@ def write_evaluation_input(directory):
         "command": "evaluate", "runs": {"town/switching": run, "town/ekf": run, "short": run}})
 
 
+def without_pictures(page):
+    """The page with its pictures' data cut out."""
+    return re.sub(r"base64,[^\"]*", "base64,", page)
+
+
+def write_track_input(directory, runs=None):
+    """A track of three poses and a fix with a nasty reason; `runs` in place of those of metrics.json. The track's path."""
+    one = [0.0, 1.0, 2.0]
+    track = {"name": "town/switching", "localizer": "imm_ekf", "start": 1.6e9, "datum": [48.0, 11.0, 0.0],
+             "estimate": dict.fromkeys(("t", "x", "y", "xx", "xy", "yy", "sigma", "speed"), one),
+             "fixes": {"t": [1.0], "x": [1.0], "y": [2.0], "sigma": [3.0], "nis": [None], "nis_threshold": [9.2],
+                       "decision": ["rejected_gate"], "reason": ["</script><b>"]},
+             "states": {"t": [0.0], "state": ["tracking"], "healthy": [True], "reason": [""]},
+             "truth": {"t": [], "x": [], "y": []}, "errors": {"t": [], "error": []},
+             "fix_errors": {"t": [], "error": []}, "gaps": [], "gaps_of_fixes": [[0.0, 2.0]]}
+    os.makedirs(os.path.join(directory, "data"), exist_ok=True)
+    path = os.path.join(directory, "data", "track_town_switching.json")
+    write_json(path, track)
+    metrics_path = os.path.join(directory, "metrics.json")
+    metrics = json.loads(read_text(metrics_path)) if os.path.exists(metrics_path) else {"command": "evaluate"}
+    metrics["runs"] = metrics.get("runs", {}) if runs is None else runs
+    metrics["tracks"] = {"town/switching": {
+        "duration_s": 2.0, "longest_gap_of_fixes_s": 12.5, "sigma_m": {"median": None},
+        "decisions": {"accepted": 2, "inflated": 1, "rejected_gate": 1, "unknown": 4}}}
+    write_json(metrics_path, metrics)
+    return path
+
+
 def write_bias_input(directory):
     """A drive with buildings between 40 and 60 s, where the fixes are 8 m off; a scenario without buildings."""
     t = np.arange(0.0, 100.0)
@@ -221,7 +251,7 @@ class PaperExperimentTest(ReportCase):
         self.assertIn("noise_scale", page)
         self.assertIn("<td>\u2013</td>", page)
         self.assertIn("beyond it go: conventional.", page)
-        self.assertNotIn("nan", page)
+        self.assertNotIn("nan", without_pictures(page))
 
     def test_method_without_data_is_said(self):
         """A method of the metrics without a trajectory does not vanish silently."""
@@ -293,6 +323,7 @@ class EvaluationTest(ReportCase):
         """Two pictures for each run and the distributions."""
         self.assert_succeeds(self.SCRIPT)
         self.assert_picture("cdf.png")
+        self.assert_picture("overview.png")
         for run in ("town_switching", "town_ekf", "short"):
             self.assert_picture("trajectory_" + run + ".png")
             self.assert_picture("errors_" + run + ".png")
@@ -306,7 +337,18 @@ class EvaluationTest(ReportCase):
             self.assertIn(text, page)
         self.assertIn("<td>98.0</td>", page)
         self.assertIn("<td>57.30</td>", page)
-        self.assertNotIn("nan", page)
+        self.assertNotIn("nan", without_pictures(page))
+
+    def test_raw_fixes_are_beside_the_estimates(self):
+        """They have a row, and no pictures of their own."""
+        for kind, source in (("errors", "town_ekf"), ("fixes", "town_switching")):
+            shutil.copy(self.path("data", kind + "_" + source + ".csv"), self.path("data", kind + "_town_gps_fix.csv"))
+        metrics = json.loads(read_text(self.path("metrics.json")))
+        metrics["runs"]["town/gps/fix"] = metrics["runs"]["town/ekf"]
+        write_json(self.path("metrics.json"), metrics)
+        self.assert_succeeds(self.SCRIPT)
+        self.assertIn("</span>town: raw fix</td>", read_text(self.path("report.html")))
+        self.assertFalse(os.path.exists(self.path("trajectory_town_gps_fix.png")))
 
     def test_run_without_samples(self):
         """A file with only a header gives a page that says so."""
@@ -348,9 +390,35 @@ class EvaluationTest(ReportCase):
                             ": runs town/ekf and town_ekf have the same file names")
 
     def test_missing_runs(self):
-        """Metrics without runs are refused."""
+        """Metrics with neither runs nor tracks are refused."""
         write_json(self.path("metrics.json"), {"command": "evaluate"})
-        self.assert_refuses(self.SCRIPT, self.path("metrics.json") + ": missing object runs")
+        self.assert_refuses(self.SCRIPT, self.path("metrics.json") + ": neither runs nor tracks")
+
+    def test_page_needs_no_other_file(self):
+        """Nothing of it is fetched, from beside it or from elsewhere."""
+        write_track_input(self.directory)
+        self.assert_succeeds(self.SCRIPT)
+        page = without_pictures(read_text(self.path("report.html")))
+        self.assertEqual(8, page.count('src="data:image/png;base64,'))
+        self.assertEqual([], re.findall(r'(?:src|href)="(?!data:)[^"]*"|https?://|@import|url\(|fetch\(', page))
+
+    def test_tracks_without_truth(self):
+        """A page with the map and a table, and without pictures."""
+        write_track_input(self.directory, {})
+        self.assert_succeeds(self.SCRIPT)
+        page = read_text(self.path("report.html"))
+        for text in ("<title>Tracks</title>", "drawTracks(", "\\u003c/script>", "<td>75.0</td>", "<td>12.5</td>"):
+            self.assertIn(text, page)
+        self.assertNotIn("<img", page)
+        self.assertEqual(1, page.count("</script>"))
+
+    def test_broken_track_is_named(self):
+        """The file and what is missing are in the message."""
+        path = write_track_input(self.directory, {})
+        track = json.loads(read_text(path))
+        del track["fixes"]["decision"]
+        write_json(path, track)
+        self.assert_refuses(self.SCRIPT, path + ": missing list fixes.decision")
 
 
 class BiasExperimentTest(ReportCase):
