@@ -225,7 +225,7 @@ def plot_distributions(path, runs, colours):
     axes.set_xscale("log")
     axes.set_xlim(left=lower_end(runs))
     axes.set_ylim(0.0, 1.02)
-    common.plain_ticks(axes.xaxis)
+    common.plain_ticks(axes.xaxis, (1.0, 2.0, 5.0))
     common.light_grid(axes)
     axes.set_ylabel("share of the time with a smaller error")
     axes.set_xlabel("position error [m]")
@@ -236,7 +236,7 @@ def plot_distributions(path, runs, colours):
 def plot_overview(path, runs, colours, title):
     """All runs and the raw fixes: a map beside the errors over time."""
     shown = [run for run in runs if not run.is_fix] or runs
-    figure, (left, right) = plt.subplots(1, 2, figsize=(13.0, 5.0), gridspec_kw={"width_ratios": (1.0, 1.4)})
+    figure, (left, right) = plt.subplots(1, 2, figsize=(14.0, 4.6), gridspec_kw={"width_ratios": (1.15, 1.2), "wspace": 0.15})
     start = min((run.errors["t"][0] for run in shown if len(run.errors)), default=0.0)
     for label, fixes in raw_fixes(runs):
         left.plot(fixes["fix_x"], fixes["fix_y"], ".", color=common.FIX_COLOUR, markersize=2.5)
@@ -255,16 +255,17 @@ def plot_overview(path, runs, colours, title):
     if limits:
         left.set_xlim(limits[0], limits[1])
         left.set_ylim(limits[2], limits[3])
-    left.set_aspect("equal", adjustable="datalim")
+    left.set_aspect("equal", adjustable="box")
     left.set_xlabel("east [m]")
     left.set_ylabel("north [m]")
     right.set_yscale("log")
-    common.plain_ticks(right.yaxis)
+    common.plain_ticks(right.yaxis, (1.0, 2.0, 5.0))
     right.set_xlabel("time [s]")
     right.set_ylabel("position error [m]")
     for axes in (left, right):
         common.light_grid(axes)
-    figure.suptitle(title, fontsize=12)
+    left.set_title(title, fontsize=12)
+    right.set_title("How far off", fontsize=12)
     common.legend_beside(right)
     common.save_figure(figure, path)
 
@@ -352,7 +353,7 @@ def pictured(runs):
 def add_error_part(page, runs, colours, output):
     """Tables, distributions and pictures of runs with a truth."""
     by_label = {run.label: colours[run.name] for run in runs}
-    plot_overview(output("overview.png"), runs, colours, "Where the robot was, and how far off")
+    plot_overview(output("overview.png"), runs, colours, "Where the robot was")
     page.image("overview.png", "Left: map. Right: position errors over time (logarithmic, cut at {:g} m).".format(
         OVERVIEW_LEAST_M))
     add_tables(page, runs, by_label)

@@ -16,7 +16,7 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402  (the backend must be chosen first)
 from matplotlib.colors import to_rgb  # noqa: E402
-from matplotlib.ticker import FuncFormatter  # noqa: E402
+from matplotlib.ticker import FuncFormatter, LogLocator  # noqa: E402
 import numpy as np  # noqa: E402
 
 from whole_file import NotWritten, whole_file, write_whole  # noqa: E402
@@ -203,8 +203,10 @@ def legend_beside(axes, **options):
         line.set_linewidth(2.0)
 
 
-def plain_ticks(axis):
-    """Tick labels of a logarithmic axis as 0.1, 1, 10 instead of powers."""
+def plain_ticks(axis, subs=(1.0,)):
+    """Tick labels of a logarithmic axis as 0.1, 1, 10 instead of powers; with those of `subs` times a power of ten."""
+    if len(subs) > 1:
+        axis.set_major_locator(LogLocator(subs=subs))
     axis.set_major_formatter(FuncFormatter(lambda value, _: "{:g}".format(value)))
 
 

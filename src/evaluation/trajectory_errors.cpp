@@ -16,13 +16,6 @@ namespace {
 constexpr double kWithin95 = 5.991464547107979;
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
-double position_sigma(const Eigen::Matrix3d& covariance) {
-  const Eigen::Matrix2d horizontal = covariance.topLeftCorner<2, 2>();
-  if (!horizontal.allFinite()) return kNan;
-  const double variance = Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(horizontal).eigenvalues().y();
-  return variance >= 0.0 ? std::sqrt(variance) : kNan;
-}
-
 template <int N>
 double normalized_error_squared(const Eigen::Matrix<double, N, 1>& error,
                                 const Eigen::Matrix<double, N, N>& covariance) {
@@ -39,7 +32,7 @@ ErrorSample error_sample(const Pose2& truth, const TimedPose& estimate) {
   sample.heading_error_rad = angle_difference(estimate.pose.yaw, truth.yaw);
   sample.estimate = estimate.pose;
   sample.truth = truth;
-  sample.position_sigma_m = position_sigma(estimate.covariance);
+  sample.position_sigma_m = urban_gnss::position_sigma_m(estimate.covariance);
   sample.nees = normalized_error_squared<3>({offset.x(), offset.y(), sample.heading_error_rad}, estimate.covariance);
   sample.position_nees = normalized_error_squared<2>(offset, estimate.covariance.topLeftCorner<2, 2>());
   return sample;
@@ -90,6 +83,13 @@ bool has_pose_within(const Trajectory& trajectory, Stamp stamp, Stamp distance) 
 }
 
 }  // namespace
+
+double position_sigma_m(const Eigen::Matrix3d& covariance) {
+  const Eigen::Matrix2d horizontal = covariance.topLeftCorner<2, 2>();
+  if (!horizontal.allFinite()) return kNan;
+  const double variance = Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(horizontal).eigenvalues().y();
+  return variance >= 0.0 ? std::sqrt(variance) : kNan;
+}
 
 bool is_inside_95(const ErrorSample& sample) { return sample.position_nees <= kWithin95; }
 

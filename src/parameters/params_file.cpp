@@ -36,7 +36,9 @@ ParamsFileFindings look_through_params(const YAML::Node& file, const std::string
     }
   }
   if (found.faults.empty() && !holds_section(file, node)) {
-    found.hint = "has no section " + node + ": this node takes nothing from it";
+    std::string sections;
+    for (const auto& entry : file) sections += (sections.empty() ? "" : ", ") + entry.first.as<std::string>("?");
+    found.hint = "has no section " + node + ", but " + sections + ": this node takes nothing from it";
   }
   return found;
 }

@@ -3,7 +3,9 @@
 #include <cmath>
 #include <utility>
 
+#include "urban_gnss_localization/pipeline/status_line.hpp"
 #include "urban_gnss_localization/receivers/receiver_presets.hpp"
+#include "urban_gnss_localization/ros/markers.hpp"
 #include "urban_gnss_localization/ros/topics.hpp"
 #include "urban_gnss_localization/ros/visibility_messages.hpp"
 
@@ -29,6 +31,7 @@ LocalizerNode::LocalizerNode(ros::NodeHandle& node, ros::NodeHandle& private_nod
   estimate_publisher_ = node.advertise<nav_msgs::Odometry>(topics::kEstimate, 100);
   fix_publisher_ = node.advertise<sensor_msgs::NavSatFix>(topics::kFilteredFix, 100);
   status_publisher_ = private_node.advertise<urban_gnss_localization::LocalizationStatus>(topics::kStatus, 100);
+  status_text_publisher_ = node.advertise<visualization_msgs::Marker>(topics::kStatusText, 1, true);
   datum_publisher_ = node.advertise<sensor_msgs::NavSatFix>(topics::kDatum, 1, true);
 
   state_.restore(pipeline_, parameters.state);
@@ -239,7 +242,9 @@ void LocalizerNode::publish_datum() {
 }
 
 void LocalizerNode::publish_status() {
-  status_publisher_.publish(to_message(pipeline_.report(), pipeline_.localizer(), now(), parameters_.frames.map));
+  const LocalizationReport report = pipeline_.report();
+  status_publisher_.publish(to_message(report, pipeline_.localizer(), now(), parameters_.frames.map));
+  status_text_publisher_.publish(status_marker(report, parameters_.frames.base_link));
 }
 
 void LocalizerNode::look_up_sensors() {
@@ -268,10 +273,7 @@ void LocalizerNode::every_five_seconds() {
 void LocalizerNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
   const LocalizationReport report = pipeline_.report();
   using diagnostic_msgs::DiagnosticStatus;
-  const auto level = report.healthy && !report.is_gate_inert    ? DiagnosticStatus::OK
-                     : report.state == LocalizationState::kLost ? DiagnosticStatus::ERROR
-                                                                : DiagnosticStatus::WARN;
-  status.summary(level, report.healthy && report.reason.empty() ? "tracking" : report.reason);
+  status.summary(static_cast<DiagnosticStatus::_level_type>(level_of(report)), status_line(report));
   status.add("state", to_string(report.state));
   status.add("mode", pipeline_.localizer().mode());
   status.add("last fix", to_string(report.last_fix.decision));

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "urban_gnss_localization/pipeline/status_line.hpp"
 #include "urban_gnss_localization/ros/conversions.hpp"
 #include "urban_gnss_localization/ros/marker_parts.hpp"
 
@@ -11,7 +12,34 @@ namespace {
 
 using visualization_msgs::Marker;
 
+/// After so many letters a line of the text breaks at the next space.
+constexpr std::size_t kLineLength = 40;
+
+std::string wrapped(std::string text) {
+  std::size_t begin = 0;
+  while (text.size() - begin > kLineLength) {
+    const std::size_t space = text.find(' ', begin + kLineLength);
+    if (space == std::string::npos) break;
+    text[space] = '\n';
+    begin = space + 1;
+  }
+  return text;
+}
+
 }  // namespace
+
+visualization_msgs::Marker status_marker(const LocalizationReport& report, const std::string& base_link_frame) {
+  const StatusLevel level = level_of(report);
+  const Colour colour = level == StatusLevel::kOk     ? Colour{0.3F, 1.0F, 0.5F, 1.0F}
+                        : level == StatusLevel::kWarn ? Colour{1.0F, 0.8F, 0.1F, 1.0F}
+                                                      : Colour{1.0F, 0.3F, 0.3F, 1.0F};
+  Marker text = make_marker("status", 0, Marker::TEXT_VIEW_FACING, colour, ros::Time(), base_link_frame);
+  text.frame_locked = 1;
+  text.pose.position = point(0.0, 0.0, 4.0);
+  text.scale.z = 1.5;
+  text.text = wrapped(status_line(report));
+  return text;
+}
 
 visualization_msgs::MarkerArray bias_markers(const BiasEstimate& bias, const std::string& map_frame) {
   constexpr int kSegments = 72;

@@ -1,7 +1,5 @@
-// Scores the estimates and the raw fixes in bags against ground truth: a table, JSON, error series and plots.
-
-#include <nav_msgs/Odometry.h>
-#include <sensor_msgs/NavSatFix.h>
+// Shows the tracks in bags: estimates, fixes and what was decided about them, as a page and for maps. Where there is
+// ground truth, it scores estimates and raw fixes against it: a table, JSON, error series and plots.
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
@@ -12,7 +10,7 @@
 #include <filesystem>
 #include <iomanip>
 #include <iostream>
-#include <limits>
+#include <iterator>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
@@ -20,16 +18,18 @@
 #include <string>
 #include <vector>
 
+#include "bag_tracks.hpp"
 #include "command_line.hpp"
 #include "files/bag_reader.hpp"
 #include "files/output_file.hpp"
+#include "replay/text_counts.hpp"
 #include "urban_gnss_localization/evaluation/report_json.hpp"
 #include "urban_gnss_localization/evaluation/stamp_text.hpp"
+#include "urban_gnss_localization/evaluation/track_export.hpp"
+#include "urban_gnss_localization/evaluation/track_report.hpp"
 #include "urban_gnss_localization/evaluation/trajectory_errors.hpp"
 #include "urban_gnss_localization/evaluation/tum.hpp"
 #include "urban_gnss_localization/geometry/angles.hpp"
-#include "urban_gnss_localization/geometry/local_frame.hpp"
-#include "urban_gnss_localization/ros/conversions.hpp"
 #include "urban_gnss_localization/ros/plotting.hpp"
 #include "urban_gnss_localization/ros/topics.hpp"
 
@@ -39,25 +39,32 @@ namespace fs = std::filesystem;
 using urban_gnss::BagReader;
 using urban_gnss::ErrorSample;
 using urban_gnss::InputFiles;
-using urban_gnss::LocalFrame;
+using urban_gnss::OdometryTrack;
 using urban_gnss::Stamp;
 using urban_gnss::Summary;
 using urban_gnss::TimedPose;
+using urban_gnss::TrackReport;
+using urban_gnss::TrackSummary;
 using urban_gnss::Trajectory;
 using urban_gnss::TrajectoryErrors;
 using urban_gnss::without_leading_slash;
 
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+/// Of a line in the page: more than a screen has pixels.
+constexpr std::size_t kMostPoints = 20000;
 
 struct Options {
   std::vector<std::string> bags;
   std::string output;
   std::string truth_bag;
   std::string truth_topic{urban_gnss::topics::kTruth};
-  std::vector<std::string> estimate_topics{urban_gnss::topics::kEstimate};
+  bool needs_truth{false};
+  std::vector<std::string> estimate_topics;
   std::string fix_topic{urban_gnss::topics::kFix};
   double max_gap_s{1.0};
   bool plots{true};
+  std::string kml_file, gpx_file, geojson_file;
+
+  Stamp max_gap() const { return urban_gnss::from_seconds(max_gap_s); }
 };
 
 /// One row of the table.
@@ -71,66 +78,6 @@ std::string as_file_name(std::string name) {
     if (c == '/') c = '_';
   }
   return name;
-}
-
-/// Calls `use` with every message of the topic, written with or without a leading slash. False where there is none.
-template <class Message, class Use>
-bool for_each_message(const BagReader& bag, const std::string& topic, Use use) {
-  urban_gnss::BagMessages messages(bag, {without_leading_slash(topic)});
-  while (const auto message = messages.next()) use(*urban_gnss::expect<Message>(*message));
-  return messages.size() > 0;
-}
-
-struct OdometryTrack {
-  Trajectory trajectory;
-  std::string frame;
-};
-
-/// Empty where the bag has no such topic.
-std::optional<OdometryTrack> read_odometry(const BagReader& bag, const std::string& topic) {
-  OdometryTrack track;
-  std::size_t not_finite = 0;
-  const bool found = for_each_message<nav_msgs::Odometry>(bag, topic, [&](const nav_msgs::Odometry& odometry) {
-    track.frame = without_leading_slash(odometry.header.frame_id);
-    track.trajectory.push_back(urban_gnss::to_timed_pose(odometry));
-    if (!urban_gnss::is_finite(track.trajectory.back().pose)) ++not_finite;
-  });
-  if (!found) return std::nullopt;
-  if (not_finite > 0) {
-    std::cerr << bag.name() << ": topic " << topic << ": " << not_finite << " poses are not finite\n";
-  }
-  urban_gnss::sort_by_stamp(track.trajectory);
-  return track;
-}
-
-std::optional<LocalFrame> read_datum(const BagReader& bag) {
-  std::optional<LocalFrame> frame;
-  for_each_message<sensor_msgs::NavSatFix>(bag, urban_gnss::topics::kDatum, [&](const sensor_msgs::NavSatFix& datum) {
-    frame.emplace(urban_gnss::GeodeticPosition{datum.latitude, datum.longitude, datum.altitude});
-  });
-  return frame;
-}
-
-/// The fixes as poses without a yaw; those without a position are left out.
-Trajectory read_fixes(const BagReader& bag, const std::string& topic, const LocalFrame& frame) {
-  Trajectory fixes;
-  for_each_message<sensor_msgs::NavSatFix>(bag, topic, [&](const sensor_msgs::NavSatFix& fix) {
-    if (fix.status.status < sensor_msgs::NavSatStatus::STATUS_FIX) return;
-    // A fix without a height is still a horizontal fix.
-    const double altitude = std::isfinite(fix.altitude) ? fix.altitude : frame.datum().altitude_m;
-    const Eigen::Vector3d local = frame.to_local({fix.latitude, fix.longitude, altitude});
-    if (!local.allFinite()) return;
-    TimedPose pose;
-    pose.stamp = urban_gnss::to_stamp(fix.header.stamp);
-    pose.pose = {local.x(), local.y(), kNan};
-    if (fix.position_covariance_type != sensor_msgs::NavSatFix::COVARIANCE_TYPE_UNKNOWN) {
-      pose.covariance.topLeftCorner<2, 2>() << fix.position_covariance[0], fix.position_covariance[1],
-          fix.position_covariance[3], fix.position_covariance[4];
-    }
-    fixes.push_back(pose);
-  });
-  urban_gnss::sort_by_stamp(fixes);
-  return fixes;
 }
 
 /// A number with nine significant digits, NaN as "nan" whatever its sign.
@@ -192,65 +139,126 @@ void warn_of_missing_end(const std::string& name, const Trajectory& truth, const
             << " s: its errors are of the part before\n";
 }
 
-/// Errors of every estimate topic in the bag that was asked for.
-std::vector<Run> evaluate_estimates(const BagReader& bag, const std::string& stem, const OdometryTrack& truth,
-                                    const Options& options) {
-  std::vector<Run> runs;
-  for (const std::string& topic : options.estimate_topics) {
-    const auto estimate = read_odometry(bag, topic);
-    if (!estimate) continue;
-    const std::string name = stem + "/" + without_leading_slash(topic);
-    if (estimate->frame != truth.frame) {
-      std::cerr << name << ": in frame " << estimate->frame << ", but the truth is in " << truth.frame << '\n';
-    }
-    warn_of_missing_end(name, truth.trajectory, estimate->trajectory, options.max_gap_s);
-    runs.push_back({name, urban_gnss::errors_at_truth(truth.trajectory, estimate->trajectory,
-                                                      urban_gnss::from_seconds(options.max_gap_s))});
+/// Those that were asked for, or every odometry/filtered, in whatever namespace.
+std::vector<std::string> find_estimate_topics(const BagReader& bag, const Options& options) {
+  if (!options.estimate_topics.empty()) return options.estimate_topics;
+  const std::string end = std::string("/") + urban_gnss::topics::kEstimate;
+  std::vector<std::string> found;
+  for (const urban_gnss::BagConnection& connection : bag.connections()) {
+    const std::string topic = "/" + without_leading_slash(connection.topic);
+    const bool ends_so = topic.size() >= end.size() && topic.compare(topic.size() - end.size(), end.size(), end) == 0;
+    if (ends_so && connection.type == "nav_msgs/Odometry") found.push_back(topic);
   }
-  return runs;
+  return found;
 }
 
-/// Errors of the raw fixes; nothing where there are none, or no datum to place them by.
-std::optional<Run> evaluate_fixes(const BagReader& bag, const BagReader& truth_bag, const std::string& stem,
-                                  const OdometryTrack& truth, const Options& options) {
-  const std::string name = stem + "/" + without_leading_slash(options.fix_topic);
-  auto frame = read_datum(bag);
-  if (!frame) frame = read_datum(truth_bag);
-  if (!frame) {
-    std::cerr << name << ": not evaluated, as no bag has a gps/datum\n";
-    return std::nullopt;
-  }
-  const Trajectory fixes = read_fixes(bag, options.fix_topic, *frame);
-  if (fixes.empty()) return std::nullopt;
-  return Run{name, urban_gnss::errors_at_fixes(truth.trajectory, fixes)};
-}
+/// What one bag and that of the truth, which may be the same, have in common for all estimates.
+struct Drive {
+  std::string stem;
+  std::optional<OdometryTrack> truth;
+  std::optional<urban_gnss::LocalFrame> map;
+  Trajectory fixes;
+};
 
-/// Scores one bag and writes its series. The truth comes from `truth_bag`, which may be the same one.
-std::vector<Run> evaluate_bag(const std::string& path, const BagReader& bag, const BagReader& truth_bag,
-                              const Options& options, const InputFiles& inputs) {
-  const auto truth = read_odometry(truth_bag, options.truth_topic);
-  if (!truth) {
+Drive read_drive(const std::string& path, const BagReader& bag, const BagReader& truth_bag, const Options& options) {
+  Drive drive;
+  drive.stem = fs::path(path).stem().string();
+  drive.truth = read_odometry(truth_bag, options.truth_topic);
+  if (!drive.truth && options.needs_truth) {
     throw std::runtime_error(truth_bag.name() + ": no ground truth on topic " + options.truth_topic +
-                             " (another bag's is taken with --truth)");
+                             (options.truth_bag.empty() ? " (another bag's is taken with --truth)" : ""));
   }
-  const std::string stem = fs::path(path).stem().string();
-  std::vector<Run> runs = evaluate_estimates(bag, stem, *truth, options);
-  const auto fixes = evaluate_fixes(bag, truth_bag, stem, *truth, options);
-  if (fixes) runs.push_back(*fixes);
-  if (runs.empty()) throw std::runtime_error(path + ": none of the topics to evaluate is in it");
+  drive.map = urban_gnss::read_datum(bag);
+  if (!drive.map) drive.map = urban_gnss::read_datum(truth_bag);
+  const BagReader& fix_bag = bag.count(options.fix_topic) > 0 ? bag : truth_bag;
+  if (drive.map) {
+    drive.fixes = urban_gnss::read_fixes(fix_bag, options.fix_topic, *drive.map);
+  } else if (fix_bag.count(options.fix_topic) > 0) {
+    std::cerr << drive.stem << "/" << without_leading_slash(options.fix_topic)
+              << ": not placed, as no bag has a gps/datum\n";
+  }
+  return drive;
+}
 
-  const Stamp start = truth->trajectory.front().stamp;
+/// The estimate of one topic, without errors; nothing where the bag does not have it.
+std::optional<TrackReport> read_report(const BagReader& bag, const Drive& drive, const std::string& topic) {
+  auto estimate = urban_gnss::read_odometry(bag, topic);
+  if (!estimate) return std::nullopt;
+  urban_gnss::StatusTrack status = urban_gnss::read_status(bag, topic);
+  TrackReport report;
+  report.name = drive.stem + "/" + without_leading_slash(topic);
+  if (drive.truth && estimate->frame != drive.truth->frame) {
+    std::cerr << report.name << ": is in frame '" << estimate->frame << "', the truth in '" << drive.truth->frame
+              << "'; they are compared as if it were one\n";
+  }
+  report.localizer = status.localizer;
+  report.map = drive.map;
+  report.estimate = std::move(estimate->trajectory);
+  report.speeds_mps = std::move(estimate->speeds_mps);
+  report.states = std::move(status.states);
+  for (const TimedPose& pose : drive.fixes) {
+    urban_gnss::DecidedFix fix{pose.stamp, pose.pose.position(), urban_gnss::position_sigma_m(pose.covariance), {}};
+    const auto outcome = status.outcomes.find(pose.stamp);
+    if (outcome != status.outcomes.end()) fix.outcome = outcome->second;
+    report.fixes.push_back(std::move(fix));
+  }
+  return report;
+}
+
+void write_run(const Run& run, const std::optional<TrajectoryErrors>& fixes, Stamp start, const Options& options,
+               const InputFiles& inputs) {
   const fs::path output(options.output);
-  write_trajectory(output / ("truth_" + as_file_name(stem) + ".tum"), inputs, truth->trajectory);
+  const std::string name = as_file_name(run.name);
+  write_error_series(output / "data" / ("errors_" + name + ".csv"), inputs, run.errors.samples, start);
+  write_trajectory(output / ("errors_" + name + ".tum"), inputs, scored_poses(run.errors.samples));
+  // With every run, as each one's plot shows the fixes that it had.
+  if (fixes) write_fix_series(output / "data" / ("fixes_" + name + ".csv"), inputs, fixes->samples, start);
+}
+
+/// All that is known of the estimates in the bags.
+struct Results {
+  std::vector<TrackReport> reports;
+  std::vector<Run> runs;  ///< where there is a truth
+};
+
+/// Reads one bag, scores it where there is a truth, and writes its series.
+void evaluate_bag(const std::string& path, const BagReader& bag, const BagReader& truth_bag, const Options& options,
+                  const InputFiles& inputs, Results& results) {
+  const Drive drive = read_drive(path, bag, truth_bag, options);
+  std::optional<TrajectoryErrors> fixes;
+  if (drive.truth && !drive.fixes.empty()) fixes = urban_gnss::errors_at_fixes(drive.truth->trajectory, drive.fixes);
+  std::vector<Run> runs;
+  std::vector<TrackReport> reports;
+  for (const std::string& topic : find_estimate_topics(bag, options)) {
+    auto report = read_report(bag, drive, topic);
+    if (!report) continue;
+    if (drive.truth) {
+      warn_of_missing_end(report->name, drive.truth->trajectory, report->estimate, options.max_gap_s);
+      runs.push_back(
+          {report->name, urban_gnss::errors_at_truth(drive.truth->trajectory, report->estimate, options.max_gap())});
+      report->truth = drive.truth->trajectory;
+      report->errors = runs.back().errors.samples;
+      if (fixes) report->fix_errors = fixes->samples;
+    }
+    reports.push_back(std::move(*report));
+  }
+  if (fixes) runs.push_back({drive.stem + "/" + without_leading_slash(options.fix_topic), *fixes});
+  if (runs.empty() && reports.empty()) {
+    throw std::runtime_error(
+        path + ": none of the topics to evaluate is in it" +
+        (options.estimate_topics.empty() ? " (another than odometry/filtered: --estimate-topic)" : "") + "; it has" +
+        bag.topics());
+  }
   for (const Run& run : runs) {
     if (run.errors.samples.empty()) std::cerr << run.name << ": no stamp in common with the truth\n";
-    const std::string name = as_file_name(run.name);
-    write_error_series(output / "data" / ("errors_" + name + ".csv"), inputs, run.errors.samples, start);
-    write_trajectory(output / ("errors_" + name + ".tum"), inputs, scored_poses(run.errors.samples));
-    // With every run, as each one's plot shows the fixes that it had.
-    if (fixes) write_fix_series(output / "data" / ("fixes_" + name + ".csv"), inputs, fixes->errors.samples, start);
   }
-  return runs;
+  if (!options.output.empty() && drive.truth) {
+    const fs::path tum = fs::path(options.output) / ("truth_" + as_file_name(drive.stem) + ".tum");
+    write_trajectory(tum, inputs, drive.truth->trajectory);
+    for (const Run& run : runs) write_run(run, fixes, drive.truth->trajectory.front().stamp, options, inputs);
+  }
+  std::move(reports.begin(), reports.end(), std::back_inserter(results.reports));
+  std::move(runs.begin(), runs.end(), std::back_inserter(results.runs));
 }
 
 void print_table(std::ostream& out, const std::vector<Run>& runs) {
@@ -287,13 +295,74 @@ void print_table(std::ostream& out, const std::vector<Run>& runs) {
   out << "errors in m; heading_deg is the heading's root mean square error; a consistent estimate has a NEES of 3\n";
 }
 
-void write_metrics(const fs::path& path, const InputFiles& inputs, const std::vector<Run>& runs) {
-  nlohmann::json metrics = {{"runs", nlohmann::json::object()}};
-  for (const Run& run : runs) metrics["runs"][run.name] = urban_gnss::to_json(run.errors.summary);
-  urban_gnss::write_file(path, inputs, [&](std::ostream& file) { file << metrics.dump(2) << '\n'; });
+/// "3 (longest 12.5 s, from 40.1 s)", counted from the begin.
+std::string describe(const std::vector<urban_gnss::Gap>& gaps, Stamp start) {
+  if (gaps.empty()) return "none";
+  const auto longest = std::max_element(gaps.begin(), gaps.end(),
+                                        [](const auto& a, const auto& b) { return a.end - a.begin < b.end - b.begin; });
+  std::ostringstream text;
+  text << std::fixed << std::setprecision(1) << gaps.size() << " (longest "
+       << urban_gnss::to_seconds(longest->end - longest->begin) << " s, from "
+       << urban_gnss::to_seconds(longest->begin - start) << " s)";
+  return text.str();
 }
 
-void evaluate(const Options& options, const InputFiles& inputs) {
+void print_track(std::ostream& out, const TrackReport& report, const TrackSummary& summary) {
+  const Stamp start = report.estimate.empty() ? Stamp(0) : report.estimate.front().stamp;
+  out << report.name << (report.localizer.empty() ? "" : " (" + report.localizer + ")") << ": " << summary.estimates
+      << " estimates, " << std::fixed << std::setprecision(1) << summary.duration_s << " s, " << std::setprecision(0)
+      << summary.distance_m << " m\n  claimed sigma: median " << std::setprecision(2) << summary.sigma_m.median
+      << " m, 95 % " << summary.sigma_m.p95 << " m; speed: mean " << summary.speed_mps.mean << " m/s, max "
+      << summary.speed_mps.max << " m/s; gaps: " << describe(summary.gaps, start) << '\n';
+  out << "  " << summary.fixes << " fixes:";
+  for (const auto& [decision, count] : summary.decisions) out << "  " << decision << ' ' << count;
+  out << "\n  without a fix that was used: " << describe(summary.gaps_of_fixes, start) << '\n';
+  urban_gnss::TextCounts rejections;
+  for (const urban_gnss::DecidedFix& fix : report.fixes) {
+    if (fix.outcome && is_rejected(fix.outcome->decision)) {
+      rejections.add(std::string(to_string(fix.outcome->decision)) + ": " + fix.outcome->reason);
+    }
+  }
+  for (const auto& [kind, texts] : rejections.kinds()) out << "  " << texts.count << " times " << texts.first << '\n';
+  for (const auto& [state, seconds] : summary.seconds_in_state) {
+    out << "  " << state << ": " << std::setprecision(1) << seconds << " s\n";
+  }
+}
+
+void write_exports(const Results& results, const Options& options, const InputFiles& inputs) {
+  const auto write = [&](const std::string& file, auto writer) {
+    if (file.empty()) return;
+    urban_gnss::write_file(file, inputs, [&](std::ostream& out) { writer(out, results.reports, options.max_gap()); });
+  };
+  write(options.kml_file, urban_gnss::write_kml);
+  write(options.gpx_file, urban_gnss::write_gpx);
+  write(options.geojson_file, urban_gnss::write_geojson);
+}
+
+void write_folder(const Results& results, const std::string& command, const Options& options,
+                  const InputFiles& inputs) {
+  const fs::path output(options.output);
+  nlohmann::json metrics = {
+      {"command", command}, {"runs", nlohmann::json::object()}, {"tracks", nlohmann::json::object()}};
+  for (const Run& run : results.runs) metrics["runs"][run.name] = urban_gnss::to_json(run.errors.summary);
+  for (const TrackReport& report : results.reports) {
+    const TrackSummary summary = urban_gnss::summarize(report, options.max_gap());
+    metrics["tracks"][report.name] = urban_gnss::to_json(summary);
+    const fs::path file = output / "data" / ("track_" + as_file_name(report.name) + ".json");
+    urban_gnss::write_file(file, inputs, [&](std::ostream& out) {
+      out << urban_gnss::to_json(report, summary, kMostPoints)
+                 .dump(-1, ' ', false, nlohmann::json::error_handler_t::replace)
+          << '\n';
+    });
+  }
+  urban_gnss::write_file(output / "metrics.json", inputs, [&](std::ostream& file) { file << metrics.dump(2) << '\n'; });
+  if (options.plots) urban_gnss::run_plotter("plot_evaluation.py", options.output);
+}
+
+void evaluate(const Options& options, const std::string& command, const InputFiles& inputs) {
+  if (options.output.empty() && options.kml_file.empty() && options.gpx_file.empty() && options.geojson_file.empty()) {
+    throw std::runtime_error("nothing to write: give --output, --kml, --gpx or --geojson");
+  }
   std::set<std::string> stems;
   for (const std::string& bag : options.bags) {
     const std::string stem = fs::path(bag).stem().string();
@@ -304,16 +373,20 @@ void evaluate(const Options& options, const InputFiles& inputs) {
   std::optional<BagReader> truth_bag;
   if (!options.truth_bag.empty()) truth_bag.emplace(options.truth_bag);
 
-  std::vector<Run> runs;
+  Results results;
   for (const std::string& bag : options.bags) {
     const BagReader opened(bag);
-    for (Run& run : evaluate_bag(bag, opened, truth_bag ? *truth_bag : opened, options, inputs)) {
-      runs.push_back(std::move(run));
-    }
+    evaluate_bag(bag, opened, truth_bag ? *truth_bag : opened, options, inputs, results);
   }
-  print_table(std::cout, runs);
-  write_metrics(fs::path(options.output) / "metrics.json", inputs, runs);
-  if (options.plots) urban_gnss::run_plotter("plot_evaluation.py", options.output);
+  if (results.runs.empty()) {
+    for (const TrackReport& report : results.reports) {
+      print_track(std::cout, report, urban_gnss::summarize(report, options.max_gap()));
+    }
+  } else {
+    print_table(std::cout, results.runs);
+  }
+  write_exports(results, options, inputs);
+  if (!options.output.empty()) write_folder(results, command, options, inputs);
 }
 
 }  // namespace
@@ -321,28 +394,35 @@ void evaluate(const Options& options, const InputFiles& inputs) {
 int main(int argc, char** argv) {
   Options options;
   bool no_plots = false;
-  urban_gnss::CommandLine line("evaluate", "Scores estimates and raw fixes in bags against ground truth.");
+  urban_gnss::CommandLine line("evaluate",
+                               "Shows the tracks in bags, as a page and for maps, and scores estimates and raw fixes "
+                               "where there is ground truth.");
   CLI::App& app = line.app();
   app.add_option("BAG", options.bags, "bags to evaluate")->required()->check(CLI::ExistingFile);
-  line.add_output_folder("--output", options.output, "folder for metrics.json, data/, trajectories and plots")
-      ->required();
-  app.add_option("--truth", options.truth_bag, "bag with the ground truth; default: each bag's own")
+  line.add_output_folder("--output", options.output,
+                         "folder for report.html, metrics.json, data/, trajectories and plots");
+  app.add_option("--truth", options.truth_bag, "bag with the ground truth; default: each bag's own, if it has one")
       ->check(CLI::ExistingFile);
-  app.add_option("--truth-topic", options.truth_topic, "nav_msgs/Odometry");
-  CLI::Option* estimate_topic =
-      app.add_option("--estimate-topic", options.estimate_topics,
-                     "nav_msgs/Odometry, may be given several times; default: odometry/filtered");
+  const CLI::Option* truth_topic = app.add_option("--truth-topic", options.truth_topic, "nav_msgs/Odometry");
+  CLI::Option* estimate_topic = app.add_option("--estimate-topic", options.estimate_topics,
+                                               "nav_msgs/Odometry, may be given several times; default: every "
+                                               "odometry/filtered, in whatever namespace");
 #if CLI11_VERSION_MAJOR >= 2
   estimate_topic->allow_extra_args(false);  // one topic each, so that a bag may follow it
 #else
   static_cast<void>(estimate_topic);  // Ubuntu 20.04's CLI11 cannot: there the bags come first
 #endif
-  app.add_option("--fix-topic", options.fix_topic, "sensor_msgs/NavSatFix");
+  app.add_option("--fix-topic", options.fix_topic,
+                 "sensor_msgs/NavSatFix, of the bag, or of the truth's where that has none");
   app.add_option("--max-gap", options.max_gap_s, "longest time over which an estimate is interpolated, s")
       ->check(CLI::Range(1e-3, 1e6));
-  app.add_flag("--no-plots", no_plots, "write no plots");
+  line.add_output("--kml", options.kml_file, "write the tracks here, for Google Earth, Mapviz, QGIS");
+  line.add_output("--gpx", options.gpx_file, "write the tracks here, for phones and JOSM");
+  line.add_output("--geojson", options.geojson_file, "write the tracks here, for QGIS and web maps");
+  app.add_flag("--no-plots", no_plots, "write no plots and no page");
   return line.run(argc, argv, [&] {
     options.plots = !no_plots;
-    evaluate(options, line.inputs());
+    options.needs_truth = !options.truth_bag.empty() || truth_topic->count() > 0;
+    evaluate(options, line.command(), line.inputs());
   });
 }

@@ -4,12 +4,16 @@
 #include <sensor_msgs/NavSatFix.h>
 
 #include <chrono>
+#include <cmath>
+#include <cstdint>
 #include <filesystem>
 #include <iomanip>
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <sstream>
+#include <string>
+#include <system_error>
 
 #include "command_line.hpp"
 #include "files/output_bag.hpp"
@@ -29,6 +33,7 @@ using namespace urban_gnss;
 namespace {
 
 constexpr double kPaperFieldDuration_s = 30.0;  ///< three laps
+constexpr double kForecastAfter_s = 5.0;        ///< of simulated time, in which every sensor has spoken
 
 struct Options {
   std::string scenario;
@@ -104,6 +109,7 @@ class BagWriter {
     bag_.write("/" + topic, to_ros(last_), message);
   }
   void close() { bag_.close(); }
+  std::uint64_t size() const { return bag_.size(); }
 
  private:
   OutputBag bag_;
@@ -136,6 +142,31 @@ void print_summary(const ReceiverSummary& summary, std::ostream& out) {
   }
 }
 
+/// "1.9 GB" or "240 MB".
+std::string bytes_text(double bytes) {
+  std::ostringstream text;
+  text << std::fixed;
+  if (bytes >= 1e9) {
+    text << std::setprecision(1) << 1e-9 * bytes << " GB";
+  } else {
+    text << std::setprecision(0) << std::ceil(1e-6 * bytes) << " MB";
+  }
+  return text.str();
+}
+
+/// How large the bag will be, from its size when `done` (0 to 1) of the drive is over.
+void print_forecast(const Options& options, std::uint64_t size, double done) {
+  const double bytes = static_cast<double>(size) / done;
+  std::cerr << options.output << ": will have about " << bytes_text(bytes);
+  std::error_code error;
+  const fs::path folder = fs::absolute(options.output, error).parent_path();
+  const auto space = fs::space(folder, error);
+  const double missing = bytes - static_cast<double>(size) - static_cast<double>(space.available);
+  if (!error && missing > 0.0) std::cerr << ", for which the disk lacks " << bytes_text(missing);
+  if (!options.without_lidar) std::cerr << "; --without-lidar leaves out the scans, most of it";
+  std::cerr << '\n';
+}
+
 void run(const Options& options, const InputFiles& inputs) {
   const SimulationFrames frames;
   Run run = make_run(options, frames);
@@ -156,6 +187,7 @@ void run(const Options& options, const InputFiles& inputs) {
     const double wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - wall_start).count();
     return to_seconds(simulator.now() - begin) / std::max(wall_s, 1e-6);
   };
+  bool is_forecast_due = bag != nullptr;
   while (!simulator.is_finished()) {
     events.clear();
     simulator.step(std::nullopt, events);
@@ -165,6 +197,10 @@ void run(const Options& options, const InputFiles& inputs) {
       write_messages(event, local, frames, [&](const std::string& topic, const auto& message) {
         bag->write(topic, event.published, message);
       });
+    }
+    if (is_forecast_due && to_seconds(simulator.now() - begin) >= kForecastAfter_s && simulator.progress() > 0.0) {
+      print_forecast(options, bag->size(), simulator.progress());
+      is_forecast_due = false;
     }
     std::ostringstream detail;
     detail << std::fixed << std::setprecision(0) << to_seconds(simulator.now() - begin) << " s simulated, "

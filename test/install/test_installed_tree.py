@@ -42,6 +42,9 @@ class InstalledTreeTest(unittest.TestCase):
         self.assertIn("summary: 0 FAIL", self.run_installed(rosrun + "doctor drive.bag --html doctor.html"))
         self.run_installed(rosrun + "evaluate out.bag --truth drive.bag --output results")
         self.assertTrue(glob.glob(os.path.join(self.directory, "results", "*.png")), "the reports' scripts are installed")
+        self.run_installed(rosrun + "evaluate out.bag --output tracks --kml out.kml")
+        self.assertGreater(os.path.getsize(os.path.join(self.directory, "tracks", "report.html")), 50000)
+        self.assertIn("usage: watch", self.run_installed(rosrun + "watch --help"))
 
     def test_the_demo_runs(self):
         """The live graph of the paper's field, until the filter has published some poses."""

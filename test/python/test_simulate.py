@@ -6,6 +6,7 @@ import filecmp
 import json
 import math
 import os
+import re
 import tempfile
 import unittest
 
@@ -123,6 +124,17 @@ class SimulateTest(unittest.TestCase):
             self.assertEqual(truth.header.frame_id, "map")
         datum = self.of("a.bag", "/gps/datum")[0]
         self.assertEqual((datum.latitude, datum.longitude, datum.altitude), (22.2988, 114.1722, 5.0))
+
+    def test_says_early_how_large_the_bag_will_be(self):
+        for arguments in (SMALL_LIDAR, ("--without-lidar",)):
+            said = self.succeed("--scenario", "downtown_grid", "--duration", 60, *arguments, "--output",
+                                self.path("a.bag"))
+            forecast = re.search(r"a\.bag: will have about (\d+) MB(.*)", said)
+            self.assertTrue(forecast, said)
+            self.assertLess(said.index("will have about"), said.index("200/1000"), "while there is time to end it")
+            self.assertAlmostEqual(float(forecast.group(1)) / (1e-6 * os.path.getsize(self.path("a.bag"))), 1.0,
+                                   delta=0.4)
+            self.assertEqual("--without-lidar" in forecast.group(2), "--without-lidar" not in arguments)
 
     def test_points_are_in_the_sensors_frame(self):
         self.succeed("--scenario", "downtown_grid", "--duration", 1, *SMALL_LIDAR, "--set", "lidar.mount_z=2.1",

@@ -9,6 +9,7 @@ import math
 import os
 import tempfile
 import unittest
+import xml.etree.ElementTree as ElementTree
 
 import rosbag
 
@@ -124,7 +125,10 @@ class ToolTest(unittest.TestCase):
         self.assertLess(metrics["errors"]["position_m"]["max"], 10.0)
         self.succeed("evaluate", self.path("a.bag"), "--truth", self.path("in.bag"), "--output", self.path("report"))
         with open(self.path("report", "metrics.json")) as file:
-            run_metrics = json.load(file)["runs"]["a/odometry/filtered"]
+            runs = json.load(file)["runs"]
+        self.assertEqual(set(runs), {"a/odometry/filtered", "a/gps/fix"}, "the raw fix is always beside the estimate")
+        self.assertLess(runs["a/gps/fix"]["position_m"]["max"], 2.0)
+        run_metrics = runs["a/odometry/filtered"]
         self.assertAlmostEqual(run_metrics["position_m"]["rmse"], metrics["errors"]["position_m"]["rmse"], places=3)
         self.assertTrue(os.path.exists(self.path("report", "report.html")))
 
@@ -135,6 +139,54 @@ class ToolTest(unittest.TestCase):
             self.assertLess(json.load(file)["errors"]["position_m"]["max"], 10.0)
         first, other = (open(self.path(name)).readlines()[-1].split() for name in ("a.tum", "d.tum"))
         self.assertAlmostEqual(float(first[2]) - float(other[2]), 111.2, delta=5.0)
+
+    def test_tracks_without_a_ground_truth(self):
+        """A bag of replay has all that the page needs: estimates, fixes, decisions, the datum."""
+        write_recording(self.directory)
+        self.succeed("csv_to_bag", self.directory, self.path("in.bag"))
+        self.succeed("replay", self.path("in.bag"), "--output", self.path("out.bag"))
+        said = self.succeed("evaluate", self.path("out.bag"), "--output", self.path("report"), *(
+            part for kind in ("kml", "gpx", "geojson") for part in ("--" + kind, self.path("out." + kind))))
+        self.assertRegex(said, r"out/odometry/filtered \(imm_ekf\): \d+ estimates")
+        self.assertRegex(said, r"without a fix that was used: 1 \(longest 10\.\d s, from \d+\.\d s\)")
+        with open(self.path("report", "metrics.json")) as file:
+            metrics = json.load(file)
+        track = metrics["tracks"]["out/odometry/filtered"]
+        self.assertEqual(metrics["runs"], {})
+        self.assertEqual(track["fixes"], 52)  # 61 without the 9 in the tunnel
+        self.assertEqual(sum(track["decisions"].values()), 52)
+        self.assertEqual(track["gaps_of_fixes"], 1)
+        self.assertAlmostEqual(track["longest_gap_of_fixes_s"], 10.0, delta=1.01)
+        self.assertAlmostEqual(track["speed_mps"]["median"], 3.0, delta=0.3)
+        with open(self.path("report", "report.html"), encoding="utf-8") as file:
+            self.assertIn("drawTracks(", file.read())
+        with open(self.path("out.geojson")) as file:
+            features = json.load(file)["features"]
+        self.assertEqual([each["properties"]["kind"] for each in features], ["estimate"] + 52 * ["fix"])
+        for each in features[1:]:
+            longitude, latitude = each["geometry"]["coordinates"]
+            self.assertAlmostEqual(latitude, 45.0, delta=0.001)
+            self.assertAlmostEqual(longitude, 7.0, delta=0.001)
+        for kind, tag, count in (("kml", "Point", 52), ("gpx", "trk", 2)):
+            root = ElementTree.parse(self.path("out." + kind)).getroot()
+            self.assertEqual(len([each for each in root.iter() if each.tag.endswith("}" + tag)]), count)
+
+        self.assertIn("no ground truth on topic /truth",
+                      self.refuse("evaluate", self.path("out.bag"), "--truth-topic", "/truth", "--gpx", self.path("x")))
+        self.assertIn("give --output, --kml, --gpx or --geojson", self.refuse("evaluate", self.path("out.bag")))
+        self.assertIn("none of the topics to evaluate is in it",
+                      self.refuse("evaluate", self.path("in.bag"), "--estimate-topic", "x", "--gpx", self.path("x"),
+                                  "--fix-topic", "none"))
+
+    def test_replay_says_where_a_file_has_no_section_for_it(self):
+        write_recording(self.directory)
+        self.succeed("csv_to_bag", self.directory, self.path("in.bag"))
+        with open(self.path("p.yaml"), "w") as file:
+            file.write("ukf: {publish_tf: false}\n")
+        self.assertIn("p.yaml: has no section imm_ekf, but ukf: this node takes nothing from it",
+                      self.succeed("replay", self.path("in.bag"), "--params", self.path("p.yaml")))
+        self.assertNotIn("no section", self.succeed("replay", self.path("in.bag"), "--localizer", "ukf", "--params",
+                                                    self.path("p.yaml")))
 
     def test_replay_as_printed(self):
         """The bias filter of `literal` runs on the fix itself: r-hat is then the distance from the datum."""

@@ -52,6 +52,12 @@ class ViewsTest(unittest.TestCase):
             self.assertEqual([(ellipse["Value"], ellipse["Color"]) for ellipse in ellipses], [(True, colour)], name)
         self.assertIn("error_plot", [display.get("Image Topic") for display in displays("comparison")])
 
+    def test_status_is_shown(self):
+        for view in ("localization", "city", "occlusion", "replay"):
+            shown = [display["Marker Topic"] for display in displays(view)
+                     if display["Class"] == "rviz/Marker" and display["Enabled"]]
+            self.assertEqual(["status_text"], shown, view)
+
     def test_particles_are_shown(self):
         for view in ("localization", "city", "occlusion", "replay"):
             shown = {(display["Class"], display["Topic"]) for display in displays(view)

@@ -11,6 +11,9 @@
 
 namespace urban_gnss {
 
+/// Square root (m) of the larger eigenvalue of a pose's horizontal covariance (m^2); NaN where there is none.
+double position_sigma_m(const Eigen::Matrix3d& covariance);
+
 /// How wrong an estimate is at one instant. Errors are estimate minus truth.
 struct ErrorSample {
   Stamp stamp{0};
@@ -18,8 +21,7 @@ struct ErrorSample {
   double heading_error_rad{std::numeric_limits<double>::quiet_NaN()};  ///< [-pi, pi); NaN where one has no heading
   Pose2 estimate;
   Pose2 truth;
-  /// Square root of the larger eigenvalue of the estimate's horizontal covariance; NaN where there is none.
-  double position_sigma_m{std::numeric_limits<double>::quiet_NaN()};
+  double position_sigma_m{std::numeric_limits<double>::quiet_NaN()};  ///< position_sigma_m() of the estimate
   /// Normalised estimation error squared of x, y, yaw (3 degrees of freedom); NaN where the covariance is not positive
   /// definite.
   double nees{std::numeric_limits<double>::quiet_NaN()};

@@ -119,6 +119,7 @@ class LocalizerNode {
   ros::Publisher estimate_publisher_;
   ros::Publisher fix_publisher_;  ///< the estimate as a fix
   ros::Publisher status_publisher_;
+  ros::Publisher status_text_publisher_;  ///< for rviz
   ros::Publisher datum_publisher_;
   std::vector<ros::Subscriber> subscribers_;
   std::vector<ros::ServiceServer> services_;

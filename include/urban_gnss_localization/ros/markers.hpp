@@ -1,5 +1,6 @@
 #pragma once
 
+#include <visualization_msgs/Marker.h>
 #include <visualization_msgs/MarkerArray.h>
 
 #include <string>
@@ -7,8 +8,12 @@
 
 #include "urban_gnss_localization/geometry/pose2.hpp"
 #include "urban_gnss_localization/localizers/bias_estimate.hpp"
+#include "urban_gnss_localization/pipeline/status_reporter.hpp"
 
 namespace urban_gnss {
+
+/// status_line() above the robot, as rviz's text: green, amber or red. It goes along with the base's frame.
+visualization_msgs::Marker status_marker(const LocalizationReport& report, const std::string& base_link_frame);
 
 /// The ring of radius r-hat about the predicted antenna (where the fix may lie in the shadow), orange in the shadow and
 /// green otherwise; the bias as an arrow from there; and the fix itself as a ball, yellow, or red where it was

@@ -28,6 +28,7 @@ inline constexpr char kFilteredFix[] = "gps/filtered";
 inline constexpr char kParticles[] = "particle_cloud";
 inline constexpr char kWeightedParticles[] = "particle_cloud_weighted";
 inline constexpr char kStatus[] = "status";  ///< private: ~status
+inline constexpr char kStatusText[] = "status_text";
 inline constexpr char kCommand[] = "cmd_vel";
 inline constexpr char kTargets[] = "targets";
 inline constexpr char kTargetPath[] = "targets_path";

@@ -247,8 +247,8 @@ int replay_main(int argc, char** argv, const LocalizerRegistry& localizers) {
       "--set", options.overrides,
       "a parameter of the localizer, or after gps_bias. of the bias filter, after occlusion. of occlusion_node");
   line.add_output("--output", options.output,
-                  "bag to write: odometry/filtered, gps/filtered, gps/bias, status, tf; with --occlusion "
-                  "gps/fix_weighted and gps/visibility too");
+                  "bag to write: odometry/filtered, gps/filtered, gps/fix, gps/datum, gps/bias, status, tf; with "
+                  "--occlusion gps/fix_weighted and gps/visibility too");
   app.add_option("--fix-topic", options.fix_topic, "sensor_msgs/NavSatFix");
   app.add_option("--odom-topic", options.odom_topic, "nav_msgs/Odometry");
   const auto* velocity_topic = app.add_option(

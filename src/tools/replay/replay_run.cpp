@@ -95,6 +95,7 @@ void ReplayRun::add_fix(const RawFix& fix) {
 }
 
 void ReplayRun::add_fix(const sensor_msgs::NavSatFix& message) {
+  write(topics::kFix, newest_ == Stamp(0) ? to_stamp(message.header.stamp) : newest_, message);
   if (!occlusion_) return give(message);
   occlusion_->add_fix(message);
   take_weighed();
@@ -140,9 +141,11 @@ void ReplayRun::add_truth(const nav_msgs::Odometry& message) { truth_.push_back(
 void ReplayRun::add_receiver(const ReceiverOutput& output, const std::string& antenna_frame) {
   for (const std::string& warning : output.warnings) std::cerr << "replay: " << warning << '\n';
   for (const RawFix& fix : output.fixes) {
+    const sensor_msgs::NavSatFix message = to_message(fix, antenna_frame);
     if (occlusion_) {
-      add_fix(to_message(fix, antenna_frame));
+      add_fix(message);
     } else {
+      write(topics::kFix, newest_ == Stamp(0) ? fix.stamp : newest_, message);
       add_fix(fix);
     }
   }
@@ -209,6 +212,7 @@ void ReplayRun::take(const LocalizationOutput& output) {
   if (has_truth_) estimate_.push_back(pose);
   if (tum_) write_tum(tum_->stream(), {pose});
   if (!bag_ && !occlusion_) return;
+  write_datum(output.stamp);
   write(topics::kEstimate, output.stamp, to_message(output, shell_.frames));
   write(topics::kFilteredFix, output.stamp, to_fix_message(output, *pipeline_.frame(), shell_.frames));
   tf2_msgs::TFMessage tf;
@@ -229,6 +233,13 @@ void ReplayRun::write_biases(const std::vector<BiasEstimate>& biases) {
   for (const BiasEstimate& bias : biases) {
     write(topics::kBias, bias.stamp, to_message(bias, shell_.frames.map));
   }
+}
+
+void ReplayRun::write_datum(Stamp stamp) {
+  const GeodeticPosition& datum = pipeline_.frame()->datum();
+  if (written_datum_ && *written_datum_ == datum) return;
+  written_datum_ = datum;
+  write(topics::kDatum, stamp, to_message(datum, to_ros(stamp), shell_.frames.map));
 }
 
 template <class M>

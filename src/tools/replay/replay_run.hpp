@@ -86,6 +86,8 @@ class ReplayRun {
   void look_up_sensors();
   void print(const std::vector<PipelineEvent>& events);
   void write_biases(const std::vector<BiasEstimate>& biases);
+  /// Once, and where it changes.
+  void write_datum(Stamp stamp);
   template <class M>
   void write(const std::string& topic, Stamp stamp, const M& message);
 
@@ -105,6 +107,7 @@ class ReplayRun {
   std::optional<Stamp> first_heading_;
   std::size_t estimates_{0};
   std::optional<GeodeticPosition> bag_datum_;
+  std::optional<GeodeticPosition> written_datum_;
   Trajectory estimate_;
   Trajectory truth_;
   std::map<std::string, std::size_t> decisions_;

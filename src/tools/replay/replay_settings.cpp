@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <iostream>
 #include <optional>
 #include <utility>
 
 #include "find_scenario.hpp"
 #include "overrides.hpp"
 #include "urban_gnss_localization/parameters/parameter_list.hpp"
+#include "urban_gnss_localization/parameters/params_file.hpp"
 
 namespace urban_gnss {
 namespace {
@@ -38,7 +40,16 @@ YAML::Node merge_sections(const std::string& file, const LocalizerRegistry& loca
   return map;
 }
 
+/// Says on standard error where a file has sections, but none that this run reads.
+void warn_of_other_sections(const std::string& file, const std::string& localizer) {
+  const YAML::Node map = load_map(file);
+  if (map.size() == 0 || map[kGpsBias].IsDefined() || map[kOcclusion].IsDefined()) return;
+  const std::string hint = look_through_params(map, localizer).hint;
+  if (!hint.empty()) std::cerr << file << ": " << hint << '\n';
+}
+
 void merge_file(const std::string& file, const LocalizerRegistry& localizers, Maps& maps) {
+  warn_of_other_sections(file, maps.entry);
   merge(maps.of_localizer, merge_sections(file, localizers, maps));
 }
 
