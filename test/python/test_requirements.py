@@ -148,7 +148,7 @@ class Callbacks(unittest.TestCase):
 
     # Each of these is called before the node subscribes.
     AT_THE_START = {"src/ros/node_parameters.cpp": 2, "src/nodes/gps_bias_node.cpp": 1,
-                    "src/nodes/complementary_ekf_node.cpp": 1}
+                    "src/nodes/complementary_ekf_node.cpp": 1, "src/ros/state_keeper.cpp": 1}
     OWN_THREAD = {"src/nodes/gpsd_node.cpp"}  # its reader pauses between two attempts to connect
 
     def test_none_asks_the_parameter_server(self):
