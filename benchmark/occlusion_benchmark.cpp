@@ -2,17 +2,28 @@
 // 0.1 ms), one scan of 20 000 points inserted (10 ms) and aligned (60 ms), and all that becomes of a cloud of 120 000
 // (100 ms, where they come at 10 Hz).
 //
+// What a user would take instead is measured beside it, where it is installed: PCL's octree, OctoMap, nanoflann.
+//
 //   occlusion_benchmark --benchmark_min_time=0.5
 
 #include <benchmark/benchmark.h>
+#include <pcl/kdtree/kdtree_flann.h>
+#include <pcl/octree/octree_search.h>
 
 #include <algorithm>
 #include <cmath>
 #include <vector>
+#if __has_include(<octomap/octomap.h>)
+#include <octomap/octomap.h>
+#endif
+#if __has_include(<nanoflann.hpp>)
+#include <nanoflann.hpp>
+#endif
 
 #include "urban_gnss_localization/common/random.hpp"
 #include "urban_gnss_localization/occlusion/kd_tree_ray_tracer.hpp"
 #include "urban_gnss_localization/occlusion/local_map.hpp"
+#include "urban_gnss_localization/occlusion/point_grid.hpp"
 #include "urban_gnss_localization/occlusion/scan_aligner.hpp"
 #include "urban_gnss_localization/occlusion/voxel_map.hpp"
 #include "urban_gnss_localization/occlusion/voxel_ray_tracer.hpp"
@@ -134,6 +145,65 @@ void BM_Trace40KdTree(benchmark::State& state) {
 }
 BENCHMARK(BM_Trace40KdTree)->Arg(0)->Arg(1)->Unit(benchmark::kMicrosecond);
 
+pcl::PointCloud<pcl::PointXYZ>::Ptr to_pcl_cloud(const PointCloud& cloud) {
+  pcl::PointCloud<pcl::PointXYZ>::Ptr result(new pcl::PointCloud<pcl::PointXYZ>);
+  for (const Eigen::Vector3f& point : cloud) result->push_back({point.x(), point.y(), point.z()});
+  return result;
+}
+
+/// PCL's octree at our voxel's size, up to the first voxel that the ray meets: a ray slips through a wall whose samples
+/// are as far apart as voxels are wide.
+class PclOctreeTracer : public RayTracer {
+ public:
+  PclOctreeTracer() : octree_(0.5) {
+    octree_.setInputCloud(to_pcl_cloud(city()));
+    octree_.addPointsFromInputCloud();
+  }
+  RayOutcome trace(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const override {
+    const Eigen::Vector3d start = origin + direction;  // beyond min_range
+    std::vector<pcl::PointXYZ, Eigen::aligned_allocator<pcl::PointXYZ>> centers;
+    const bool is_met =
+        octree_.getIntersectedVoxelCenters(start.cast<float>(), direction.cast<float>(), centers, 1) > 0;
+    return {is_met, 0.0, 0.0};
+  }
+
+ private:
+  pcl::octree::OctreePointCloudSearch<pcl::PointXYZ> octree_;
+};
+
+void BM_Trace40PclOctree(benchmark::State& state) {
+  static const PclOctreeTracer tracer;
+  trace_satellites(state, tracer, state.range(0) == 1);
+}
+BENCHMARK(BM_Trace40PclOctree)->Arg(1)->Arg(0)->Unit(benchmark::kMicrosecond);
+
+#if __has_include(<octomap/octomap.h>)
+/// OctoMap at our voxel's size, with the city's points as occupied, unknown space as free.
+class OctoMapTracer : public RayTracer {
+ public:
+  OctoMapTracer() : tree_(0.5) {
+    for (const Eigen::Vector3f& point : city()) tree_.updateNode(point.x(), point.y(), point.z(), true, true);
+    tree_.updateInnerOccupancy();
+  }
+  RayOutcome trace(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const override {
+    const auto point = [](const Eigen::Vector3d& v) {
+      return octomap::point3d(static_cast<float>(v.x()), static_cast<float>(v.y()), static_cast<float>(v.z()));
+    };
+    octomap::point3d end;
+    return {tree_.castRay(point(origin + direction), point(direction), end, true, 500.0), 0.0, 0.0};
+  }
+
+ private:
+  octomap::OcTree tree_;
+};
+
+void BM_Trace40OctoMap(benchmark::State& state) {
+  static const OctoMapTracer tracer;
+  trace_satellites(state, tracer, state.range(0) == 1);
+}
+BENCHMARK(BM_Trace40OctoMap)->Arg(1)->Arg(0)->Unit(benchmark::kMicrosecond);
+#endif
+
 /// What a lidar of so many beams sees on a drive through the city, in the map frame.
 std::vector<PointCloud> scans(std::vector<Eigen::Vector3d>& sensors, std::size_t beams = 20000, int count = 10) {
   const VoxelRayTracer tracer(city_map(), {});
@@ -243,6 +313,75 @@ BENCHMARK(BM_AlignScan20k)
     ->Args({1, 1})
     ->Args({1, 2})
     ->Unit(benchmark::kMillisecond);
+
+/// A search made for the points of the map about a scan, and asked for the nearest one to each of 1500 of its points 15
+/// times over, as an alignment does.
+template <class Search>
+void search_nearest(benchmark::State& state) {
+  std::vector<Eigen::Vector3d> sensors;
+  const PointCloud scan = scans(sensors, 1500, 1).front();
+  const PointCloud nearby = city_map().points_within(sensors.front(), 60.0);
+  double sum_m2 = 0.0;
+  for (auto _ : state) {
+    const Search search(nearby);
+    for (int i = 0; i < 15; ++i) {
+      const Eigen::Vector3f shift(0.3F - 0.02F * static_cast<float>(i), 0.0F, 0.0F);
+      for (const Eigen::Vector3f& point : scan) sum_m2 += search.nearest_m2(point + shift);
+    }
+  }
+  state.counters["map_points"] = static_cast<double>(nearby.size());
+  state.counters["mean_m2"] = sum_m2 / (15.0 * 1500.0 * static_cast<double>(state.iterations()));
+}
+
+struct GridSearch {
+  explicit GridSearch(const PointCloud& cloud) : grid(cloud, 0.8) {}
+  double nearest_m2(const Eigen::Vector3f& place) const {
+    PointGrid::Neighbour found{};
+    return grid.nearest(place, 2.0, found) ? static_cast<double>(found.squared_m2) : 4.0;
+  }
+  PointGrid grid;
+};
+BENCHMARK_TEMPLATE(search_nearest, GridSearch)->Name("BM_NearestOurGrid")->Unit(benchmark::kMillisecond);
+
+struct PclSearch {
+  explicit PclSearch(const PointCloud& cloud) { tree.setInputCloud(to_pcl_cloud(cloud)); }
+  double nearest_m2(const Eigen::Vector3f& place) const {
+    tree.nearestKSearch({place.x(), place.y(), place.z()}, 1, indices, squared_m2);
+    return std::min(4.0, static_cast<double>(squared_m2[0]));
+  }
+  pcl::KdTreeFLANN<pcl::PointXYZ> tree;
+  mutable std::vector<int> indices{0};
+  mutable std::vector<float> squared_m2{0.0F};
+};
+BENCHMARK_TEMPLATE(search_nearest, PclSearch)->Name("BM_NearestPclKdTree")->Unit(benchmark::kMillisecond);
+
+#if __has_include(<nanoflann.hpp>)
+struct NanoflannSearch {
+  struct Points {
+    const PointCloud& cloud;
+    std::size_t kdtree_get_point_count() const { return cloud.size(); }
+    float kdtree_get_pt(std::size_t point, std::size_t axis) const {
+      return cloud[point][static_cast<Eigen::Index>(axis)];
+    }
+    template <class Box>
+    bool kdtree_get_bbox(Box&) const {
+      return false;
+    }
+  };
+  explicit NanoflannSearch(const PointCloud& cloud) : points{cloud}, tree(3, points) { tree.buildIndex(); }
+  double nearest_m2(const Eigen::Vector3f& place) const {
+    std::size_t index = 0;
+    float squared_m2 = 0.0F;
+    nanoflann::KNNResultSet<float> found(1);
+    found.init(&index, &squared_m2);
+    tree.findNeighbors(found, place.data(), nanoflann::SearchParams());
+    return std::min(4.0, static_cast<double>(squared_m2));
+  }
+  Points points;
+  nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<float, Points>, Points, 3> tree;
+};
+BENCHMARK_TEMPLATE(search_nearest, NanoflannSearch)->Name("BM_NearestNanoflann")->Unit(benchmark::kMillisecond);
+#endif
 
 /// A map built on a drive of 60 m behind odometry that drifts by 5 % of the way to the left and 0.3 degrees a metre:
 /// how far the map's pose is off at the end, and how many alignments were refused.

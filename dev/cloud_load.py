@@ -37,11 +37,15 @@ def rays(count, generator):
 
 
 def street_points(directions, x):
-    """What the rays meet from `x`: the ground and walls of 20 m at 10 m on either side, with bays of 3 m in every 15 m that
-    are 3 m deep. float32, count x 3; NaN where a ray meets nothing."""
+    """What the rays meet from `x`: the ground, walls of 20 m at 10 m on either side, and every 15 m a pilaster that
+    stands out by 2 m, so that scans can be aligned along the street. float32, count x 3; NaN where a ray meets
+    nothing."""
+    ahead = numpy.where(numpy.abs(directions[0]) < 1e-3, 1e-3, directions[0])
     across = numpy.maximum(numpy.abs(directions[1]), 1e-3)
-    depth = numpy.where((x + directions[0] * 10.0 / across) % 15.0 < 3.0, 13.0, 10.0)
-    reach = numpy.minimum(depth / across, LIDAR_HEIGHT_M / numpy.maximum(-directions[2], 1e-3))
+    reach = numpy.minimum(10.0 / across, LIDAR_HEIGHT_M / numpy.maximum(-directions[2], 1e-3))
+    beside = (x + ahead * 8.0 / across) / 15.0  # where the ray is as far out as the pilasters
+    pilaster = 15.0 * numpy.where(ahead > 0.0, numpy.ceil(beside), numpy.floor(beside))
+    reach = numpy.minimum(reach, (pilaster - x) / ahead)
     points = directions * reach
     points[:, (reach > 90.0) | (points[2] > 20.0)] = numpy.nan
     return points.T.astype(numpy.float32)

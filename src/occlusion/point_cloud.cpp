@@ -4,13 +4,16 @@
 #include <pcl/kdtree/kdtree_flann.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
 #include <new>
 #include <stdexcept>
 
 #include "pcd_header.hpp"
 #include "pcl_cloud.hpp"
 #include "urban_gnss_localization/common/pending_file.hpp"
+#include "urban_gnss_localization/occlusion/cell_bits.hpp"
 #include "urban_gnss_localization/occlusion/key_index.hpp"
 #include "urban_gnss_localization/occlusion/voxel_walk.hpp"
 
@@ -26,24 +29,36 @@ PointCloud finite_points(const PointCloud& cloud) {
 
 PointCloud transformed(const PointCloud& cloud, const Eigen::Isometry3d& transform) {
   const Eigen::Isometry3f single = transform.cast<float>();
-  PointCloud result;
-  result.reserve(cloud.size());
-  for (const Eigen::Vector3f& point : cloud) result.push_back(single * point);
+  PointCloud result(cloud.size());
+  std::transform(cloud.begin(), cloud.end(), result.begin(),
+                 [&](const Eigen::Vector3f& point) -> Eigen::Vector3f { return single * point; });
   return result;
 }
 
 PointCloud voxel_filtered(const PointCloud& cloud, double edge_m) {
   constexpr float kFarthestM = 1e5F;
   const double farthest = std::min<double>(kFarthestM, kMaxVoxelCoordinate * edge_m);
+  const double inverse_edge = 1.0 / edge_m;
+  // A hash table of bricks of 4 x 4 x 4 cubes: points one after the other are mostly in the same.
   KeyIndex index;
+  std::vector<std::array<KeyIndex::Index, cell_bits::kPlaces>> bricks;  ///< each cube's place in the result
+  std::array<KeyIndex::Index, cell_bits::kPlaces> empty;
+  empty.fill(KeyIndex::kNone);
+  VoxelCoordinates last = VoxelCoordinates::Constant(std::numeric_limits<int>::max());
+  KeyIndex::Index brick = KeyIndex::kNone;
   PointCloud sums;
   std::vector<int> counts;
   for (const Eigen::Vector3f& point : cloud) {
     if (!(point.cwiseAbs().maxCoeff() < farthest) || !point.allFinite()) continue;
-    const auto key = voxel_key(voxel_of(point.cast<double>(), 1.0 / edge_m));
-    const auto fresh = static_cast<KeyIndex::Index>(sums.size());
-    const auto slot = index.find_or_insert(key, fresh);
-    if (slot == fresh) {
+    const VoxelCoordinates cube = voxel_of(point.cast<double>(), inverse_edge);
+    if (const VoxelCoordinates at = cell_bits::parent_of(cube); at != last) {
+      last = at;
+      brick = index.find_or_insert(voxel_key(at), static_cast<KeyIndex::Index>(bricks.size()));
+      if (brick == bricks.size()) bricks.push_back(empty);
+    }
+    KeyIndex::Index& slot = bricks[brick][cell_bits::place_of(cube)];
+    if (slot == KeyIndex::kNone) {
+      slot = static_cast<KeyIndex::Index>(sums.size());
       sums.emplace_back(Eigen::Vector3f::Zero());
       counts.push_back(0);
     }

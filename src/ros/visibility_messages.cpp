@@ -102,12 +102,19 @@ PointCloud to_point_cloud(const sensor_msgs::PointCloud2& message) {
   if (row_step < full_row || data_row < row_step) {
     throw std::invalid_argument("less data than width, height and row_step say");
   }
-  PointCloud cloud;
-  cloud.reserve(count);
+  // Most drivers write three floats side by side.
+  const bool is_plain = !x.is_double && !y.is_double && !z.is_double && y.offset == x.offset + sizeof(float) &&
+                        z.offset == y.offset + sizeof(float);
+  PointCloud cloud(count);
+  auto next = cloud.begin();
   for (std::uint32_t row = 0; row < message.height; ++row) {
     const std::uint8_t* point = message.data.data() + row * row_step;
-    for (std::uint32_t i = 0; i < message.width; ++i, point += message.point_step) {
-      cloud.emplace_back(read(point, x), read(point, y), read(point, z));
+    for (std::uint32_t i = 0; i < message.width; ++i, point += message.point_step, ++next) {
+      if (is_plain) {
+        std::memcpy(next->data(), point + x.offset, 3 * sizeof(float));
+      } else {
+        *next = {read(point, x), read(point, y), read(point, z)};
+      }
     }
   }
   return cloud;

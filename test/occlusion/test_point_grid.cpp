@@ -41,7 +41,9 @@ TEST(PointGrid, EqualsTryingAllPoints) {
       const bool is_near = grid.nearest(place, reach_m, nearest);
       ASSERT_EQ(is_near, expected[0].squared_m2 <= reach_m * reach_m) << edge_m << ' ' << i;
       none += is_near ? 0 : 1;
-      if (is_near) ASSERT_EQ(nearest.point, expected[0].point) << edge_m << ' ' << i;
+      if (is_near) {
+        ASSERT_EQ(nearest.point, expected[0].point) << edge_m << ' ' << i;
+      }
       for (const std::size_t count : {1U, 10U, 2000U}) {
         grid.nearest(place, count, found);
         ASSERT_EQ(found.size(), std::min(count, cloud.size()));
