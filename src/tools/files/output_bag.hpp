@@ -38,8 +38,8 @@ class OutputBag {
     if (chunk_.size() >= kChunkSize) end_chunk();
   }
   void close();
-  /// Bytes that have been written so far.
-  std::uint64_t size() const { return bag_ ? bag_->getSize() : 0; }
+  /// Bytes so far.
+  std::uint64_t size() const { return position_ + chunk_.size(); }
 
  private:
   static constexpr std::size_t kChunkSize = 768 * 1024;  ///< bytes, as rosbag's
