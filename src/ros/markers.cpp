@@ -35,8 +35,11 @@ visualization_msgs::Marker status_marker(const LocalizationReport& report, const
                                                       : Colour{1.0F, 0.3F, 0.3F, 1.0F};
   Marker text = make_marker("status", 0, Marker::TEXT_VIEW_FACING, colour, ros::Time(), base_link_frame);
   text.frame_locked = 1;
-  text.pose.position = point(0.0, 0.0, 4.0);
-  text.scale.z = 1.5;
+  // Who looks at an uncertain robot looks from afar.
+  const double height_m =
+      std::isfinite(report.position_sigma_m) ? std::clamp(0.8 * report.position_sigma_m, 0.7, 5.0) : 2.0;
+  text.pose.position = point(0.0, 0.0, 2.0 + height_m);
+  text.scale.z = height_m;
   text.text = wrapped(status_line(report));
   return text;
 }

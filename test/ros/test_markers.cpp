@@ -23,6 +23,9 @@ TEST(StatusMarker, GoesAlongWithTheRobotAndSaysHowItIs) {
   EXPECT_TRUE(marker.frame_locked);
   EXPECT_EQ(marker.text, "OK: 1.2 m, 34 of 35 fixes used");
   EXPECT_GT(marker.color.g, marker.color.r);
+  EXPECT_NEAR(marker.scale.z, 1.0, 0.01);
+  report.position_sigma_m = 0.02;
+  EXPECT_NEAR(status_marker(report, "base_link").scale.z, 0.7, 1e-9) << "can be read";
 }
 
 TEST(StatusMarker, LongReasonsAreWrapped) {
