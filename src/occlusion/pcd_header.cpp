@@ -34,7 +34,7 @@ class PcdCheck {
  public:
   explicit PcdCheck(const std::string& path) : path_(path), file_(path, std::ios::binary) {}
 
-  void run() {
+  std::uint64_t run() {
     std::error_code error;
     if (!file_ || !std::filesystem::is_regular_file(path_, error)) {
       throw std::runtime_error(path_ + ": cannot be read: " + (errno != 0 ? std::strerror(errno) : "is no file"));
@@ -45,6 +45,7 @@ class PcdCheck {
     const auto begin = static_cast<std::uint64_t>(file_.tellg());
     rest_ = std::filesystem::file_size(path_) - begin;
     check_data(entries_["DATA"].front());
+    return points_;
   }
 
  private:
@@ -181,9 +182,9 @@ class PcdCheck {
 
 }  // namespace
 
-void check_pcd(const std::string& path) {
+std::uint64_t check_pcd(const std::string& path) {
   errno = 0;
-  PcdCheck(path).run();
+  return PcdCheck(path).run();
 }
 
 }  // namespace urban_gnss

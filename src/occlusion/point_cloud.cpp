@@ -100,7 +100,7 @@ double sample_spacing_m(const PointCloud& cloud) {
 }
 
 PointCloud read_pcd(const std::string& path) {
-  check_pcd(path);
+  if (check_pcd(path) == 0) return {};  // PCL looks at the first point all the same
   pcl::PointCloud<pcl::PointXYZ> points;
   try {
     if (pcl::io::loadPCDFile(path, points) < 0) throw std::runtime_error("PCL refuses it");

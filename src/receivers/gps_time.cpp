@@ -15,6 +15,15 @@ constexpr std::int64_t kFirstLead_s = 13;
 
 }  // namespace
 
+bool is_time(const UtcTime& time) {
+  const auto is_within = [](std::int64_t value, std::int64_t low, std::int64_t high) {
+    return value >= low && value <= high;
+  };
+  return is_within(time.year, 1980, 2261) && is_within(time.month, 1, 12) && is_within(time.day, 1, 31) &&
+         is_within(time.hour, 0, 23) && is_within(time.minute, 0, 59) && is_within(time.second, 0, 60) &&
+         is_within(time.nanosecond, -kSecond_ns, kSecond_ns);
+}
+
 std::int64_t days_from_civil(std::int64_t year, std::int64_t month, std::int64_t day) {
   const std::int64_t y = month <= 2 ? year - 1 : year;
   const std::int64_t era = (y >= 0 ? y : y - 399) / 400;

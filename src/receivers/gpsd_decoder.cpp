@@ -82,7 +82,7 @@ void GpsdDecoder::take_position(const GpsdPosition& position, std::optional<Stam
   }
   if (!joins) {
     if (open_) give_out();
-    open_.emplace();
+    open_ = Solution();  // Clang 14 refuses emplace() of a class within that has defaults
     open_->time = position.time;
     open_->arrival = arrival;
   }

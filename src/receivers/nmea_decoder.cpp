@@ -116,7 +116,7 @@ void NmeaDecoder::take_untimed(const NmeaSentence& sentence, std::optional<Stamp
 }
 
 void NmeaDecoder::open(std::optional<Stamp> time, std::optional<Stamp> arrival) {
-  open_.emplace();
+  open_ = Solution();  // Clang 14 refuses emplace() of a class within that has defaults
   open_->time = time;
   open_->arrival = arrival;
   for (const NmeaSentence& sentence : std::exchange(ahead_, {})) put(sentence, false);

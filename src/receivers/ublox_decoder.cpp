@@ -36,7 +36,8 @@ void remember(std::deque<Stamp>& stamps, Stamp stamp) {
   if (stamps.size() > kMaxSolutions) stamps.pop_front();
 }
 
-/// The driver's rule: the receiver's UTC where it is resolved, else the time at which the message came.
+/// The driver's rule: the receiver's UTC where it is resolved, else the time at which the message came; also where the
+/// UTC is none.
 Stamp stamp_of_navpvt(const MessageView& message, Stamp arrival) {
   const bool is_resolved = (message.integer("valid") & kValidUtc) == kValidUtc;
   const bool is_confirmable = !message.has("flags2") || (message.integer("flags2") & kConfirmable) != 0;
@@ -49,7 +50,7 @@ Stamp stamp_of_navpvt(const MessageView& message, Stamp arrival) {
   time.minute = static_cast<int>(message.integer("min"));
   time.second = static_cast<int>(message.integer("sec"));
   time.nanosecond = message.integer("nano");
-  return to_stamp(time);
+  return is_time(time) ? to_stamp(time) : arrival;
 }
 
 SatelliteObservation observation_of(const MessageView& satellite) {

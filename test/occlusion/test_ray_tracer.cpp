@@ -410,6 +410,15 @@ std::string pcd_with(const std::string& entry, const std::string& data = "1 2 3\
   return text + data;
 }
 
+TEST(PointCloud, AFileWithoutPointsIsAnEmptyCloud) {
+  const std::string path = (std::filesystem::path(::testing::TempDir()) / "urban_gnss_empty_test.pcd").string();
+  std::string text = pcd_with("HEIGHT 0", "");
+  text.erase(text.find("POINTS 2\n"), 9);
+  std::ofstream(path, std::ios::binary) << text;
+  EXPECT_TRUE(read_pcd(path).empty());
+  std::filesystem::remove(path);
+}
+
 TEST(PointCloud, HeadersThatLieAreRefusedBeforeTheyAreBelieved) {
   const std::string path = (std::filesystem::path(::testing::TempDir()) / "urban_gnss_header_test.pcd").string();
   const auto fault_of = [&](const std::string& text) -> std::string {

@@ -21,11 +21,12 @@ struct Pvt {
   std::uint32_t second{0};  ///< after kSecond
   std::int32_t nano{211571};
   std::uint8_t valid{7}, fix_type{3}, flags{1}, flags2{0xE0};
+  std::uint16_t year{2018};
 };
 
 MessageBytes navpvt(const Pvt& pvt) {
   MessageBytes bytes;
-  bytes.put(kTimeOfWeek_ms + 1000 * pvt.second).put(std::uint16_t{2018}).put(std::uint8_t{3}).put(std::uint8_t{29});
+  bytes.put(kTimeOfWeek_ms + 1000 * pvt.second).put(pvt.year).put(std::uint8_t{3}).put(std::uint8_t{29});
   bytes.put(std::uint8_t{17}).put(std::uint8_t{23}).put(static_cast<std::uint8_t>(27 + pvt.second)).put(pvt.valid);
   bytes.put(std::uint32_t{1011}).put(pvt.nano).put(pvt.fix_type).put(pvt.flags).put(pvt.flags2).put(std::uint8_t{10});
   bytes.put(std::int32_t{-1174133}).put(std::int32_t{515103393}).put(std::int32_t{64671}).put(std::int32_t{19075});
@@ -69,6 +70,11 @@ TEST(GpsTime, OfARecordedFix) {
   EXPECT_EQ(to_stamp(UtcTime{2018, 3, 29, 17, 23, 27, 211571}), Stamp(1522344207000211571));
   EXPECT_EQ(to_stamp(UtcTime{1970, 1, 1, 0, 0, 0, -1}), Stamp(-1));
   EXPECT_EQ(time_of_week_ms(Stamp(1522344207000211571)), 408225000);
+  EXPECT_TRUE(is_time({2261, 12, 31, 23, 59, 60, -1000000000}));
+  for (const UtcTime& none : {UtcTime{29801, 3, 29}, UtcTime{2018, 13, 1}, UtcTime{2018, 1, 0}, UtcTime{2018, 1, 1, 24},
+                              UtcTime{2018, 1, 1, 0, 0, 0, 1LL << 62}}) {
+    EXPECT_FALSE(is_time(none));
+  }
   // Leap second at the end of 2016: GPS was ahead by 17 s before and is by 18 s since.
   const Stamp new_year = to_stamp(UtcTime{2017, 1, 1, 0, 0, 0, 0});
   EXPECT_EQ(time_of_week_ms(new_year) - time_of_week_ms(new_year - Stamp(1000000000)), 2000);
@@ -97,12 +103,13 @@ TEST(UbloxDecoder, ASolutionIsOfNavPvt) {
 
 TEST(UbloxDecoder, ItsStampIsUtcOnlyWhereThatIsKnown) {
   const Stamp arrival = at(0.3);
-  Pvt not_resolved, not_confirmable, negative;
+  Pvt not_resolved, not_confirmable, negative, no_year;
   not_resolved.valid = 3;
   not_confirmable.flags2 = 0;
   negative.nano = -400000;
-  for (const auto& [pvt, expected] :
-       {std::pair(not_resolved, arrival), std::pair(not_confirmable, arrival), std::pair(negative, at(-400e-6))}) {
+  no_year.year = 29801;  // more nanoseconds than 64 bits hold
+  for (const auto& [pvt, expected] : {std::pair(not_resolved, arrival), std::pair(not_confirmable, arrival),
+                                      std::pair(negative, at(-400e-6)), std::pair(no_year, arrival)}) {
     Feed feed("ublox");
     feed.add(ReceiverRole::kNavPvt, kNavPvt, navpvt(pvt), arrival);
     ASSERT_THAT(feed.output().fixes, SizeIs(1));

@@ -254,7 +254,7 @@ TEST(ScenarioWorld, FaultsOfBoxesAndGrids) {
   EXPECT_TRUE(has(fault("buildings: [{box: {center: [0, 0], size: [1, 1], jaw: 2}, roof: 3}]"), "did you mean yaw?"));
   EXPECT_EQ(fault("buildings: [{box: {center: [1e308, 0], size: [1, 1]}, roof: 3}]"),
             "city.yaml:1: buildings[0].box.center: both must be at least -100000 and at most 100000");
-  EXPECT_TRUE(has(fault("buildings: [{box: {center: [0, 0], size: [1, 1e-9]}, roof: 3}]"), "box: corner (0.5, "));
+  EXPECT_TRUE(has(fault("buildings: [{box: {center: [0, 0], size: [1, 1e-9]}, roof: 3}]"), "box: corner (-0.5, "));
   EXPECT_EQ(fault("buildings: [{box: {center: [0, .nan], size: [1, 1]}, roof: 3}]"),
             "city.yaml:1: buildings[0].box.center: must be two finite numbers, [x, y]");
   const auto grid_fault = [](const std::string& fields) {

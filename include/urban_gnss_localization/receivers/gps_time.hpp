@@ -12,10 +12,14 @@ struct UtcTime {
   std::int64_t nanosecond{0};
 };
 
+/// Whether it is a time of the years 1980 to 2261, which a Stamp can be; a second of 60, and nanoseconds of a second to
+/// either side, as receivers have them.
+bool is_time(const UtcTime& time);
+
 /// Days since 1970-01-01 of a day of the Gregorian calendar. Nothing is checked; month 13 is the next January.
 std::int64_t days_from_civil(std::int64_t year, std::int64_t month, std::int64_t day);
 
-/// Since 1970-01-01, without leap seconds, as ROS counts.
+/// Since 1970-01-01, without leap seconds, as ROS counts. Requires is_time(), or another time that a Stamp can be.
 Stamp to_stamp(const UtcTime& time);
 
 /// ms, of the week of GPS, 0 to 604799999: UTC plus the leap seconds since 1980 (18 since 2017; of those after this was
