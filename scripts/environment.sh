@@ -19,22 +19,24 @@ fi
 if [ -f "$_urban_gnss_root/.workspace/devel/setup.$_urban_gnss_shell" ]; then
   . "$_urban_gnss_root/.workspace/devel/setup.$_urban_gnss_shell"
 fi
-# Debian's rosbash is no part of setup.bash: completion with the tab key, roscd and the like.
-if [ -n "$BASH_VERSION" ] && ! type roscd > /dev/null 2>&1 && [ -f /usr/share/bash-completion/completions/rosbash ]; then
-  . /usr/share/bash-completion/completions/rosbash
-fi
-# It does not look into hidden folders, where scripts/setup.sh builds.
-if type _roscomplete_exe > /dev/null 2>&1; then
-  _urban_gnss_programs=$(find -L "$_urban_gnss_root/.workspace/devel/lib/urban_gnss_localization" \
-    "$_urban_gnss_root/reports" "$_urban_gnss_root/doctor" -maxdepth 1 -type f -perm /111 ! -name '*_tests' \
-    2> /dev/null | sed 's/.*\///')
-  _urban_gnss_complete() {
-    _roscomplete_exe
-    if [ "$COMP_CWORD" -eq 2 ] && [ "${COMP_WORDS[1]}" = urban_gnss_localization ]; then
-      COMPREPLY=($(compgen -W "$_urban_gnss_programs" -- "${COMP_WORDS[2]}"))
-    fi
-  }
-  complete -F _urban_gnss_complete rosrun
+# Completion with the tab key, where somebody types. Debian's rosbash is no part of setup.bash.
+if [ -n "$BASH_VERSION" ] && [[ $- == *i* ]]; then
+  if ! type roscd > /dev/null 2>&1 && [ -f /usr/share/bash-completion/completions/rosbash ]; then
+    . /usr/share/bash-completion/completions/rosbash
+  fi
+  # It does not look into hidden folders, where scripts/setup.sh builds.
+  if type _roscomplete_exe > /dev/null 2>&1; then
+    _urban_gnss_programs=$(find -L "$_urban_gnss_root/.workspace/devel/lib/urban_gnss_localization" \
+      "$_urban_gnss_root/reports" "$_urban_gnss_root/doctor" -maxdepth 1 -type f -perm /111 ! -name '*_tests' \
+      2> /dev/null | sed 's/.*\///') || true
+    _urban_gnss_complete() {
+      _roscomplete_exe
+      if [ "$COMP_CWORD" -eq 2 ] && [ "${COMP_WORDS[1]}" = urban_gnss_localization ]; then
+        COMPREPLY=($(compgen -W "$_urban_gnss_programs" -- "${COMP_WORDS[2]}"))
+      fi
+    }
+    complete -F _urban_gnss_complete rosrun
+  fi
 fi
 if [ -z "$ROS_IP" ]; then
   export ROS_HOSTNAME="${ROS_HOSTNAME:-localhost}"

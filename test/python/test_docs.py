@@ -2,6 +2,8 @@
 """The pages hold together: links lead somewhere, named files and functions exist, lines can be read."""
 import os
 import re
+import shutil
+import subprocess
 import tempfile
 import unittest
 
@@ -216,6 +218,21 @@ class Check(unittest.TestCase):
 
     def test_readme_is_a_page(self):
         self.assertEqual(["README.md:1: docs/gone.md: no such file"], self.faults("[a](docs/gone.md)", "README.md"))
+
+
+class Environment(unittest.TestCase):
+    """scripts/environment.sh, which the other scripts source before anything is built."""
+
+    def test_it_ends_no_strict_script(self):
+        """Also without a build, as in a fresh clone."""
+        with tempfile.TemporaryDirectory() as clone:
+            os.mkdir(os.path.join(clone, "scripts"))
+            shutil.copy(os.path.join(ROOT, "scripts", "environment.sh"), os.path.join(clone, "scripts"))
+            for options in ("-eo", "-ieo"):
+                done = subprocess.run(["bash", options, "pipefail", "-c", ". scripts/environment.sh; echo goes on"],
+                                      cwd=clone, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                                      stderr=subprocess.STDOUT, universal_newlines=True)
+                self.assertIn("goes on", done.stdout, options)
 
 
 if __name__ == "__main__":
