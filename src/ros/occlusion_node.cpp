@@ -48,8 +48,7 @@ OcclusionNode::OcclusionNode(ros::NodeHandle& node, ros::NodeHandle& private_nod
 
   diagnostics_.setHardwareID("none");
   diagnostics_.add("occlusion", this, &OcclusionNode::diagnose);
-  fix_timer_ = io_.every(node, 0.005, "the fixes' timer", [this] { settle_fixes(); });
-  work_timer_ = io_.every(node, 0.02, "the node's work", [this] { work(); });
+  work_timer_ = io_.every(node, 0.005, "the node's work", [this] { work(); });
   second_timer_ = io_.every(node, 1.0, "the node's timer", [this] { every_second(); });
   five_second_timer_ = io_.every(node, 5.0, "the node's timer", [this] { every_five_seconds(); });
   map_timer_ = io_.every(node, parameters_.map_publish_period, "the map's timer", [this] { publish_map(); });

@@ -76,7 +76,6 @@ class OcclusionNode {
   ros::Subscriber imu_subscriber_;
   ros::ServiceServer clear_service_;
   ros::ServiceServer save_service_;
-  ros::WallTimer fix_timer_;
   ros::WallTimer work_timer_;
   ros::WallTimer second_timer_;
   ros::WallTimer five_second_timer_;
