@@ -9,7 +9,7 @@
 #   screenshot_rviz.sh docs/images/rviz_demo.png /ground_truth/odom \
 #     'm.header.stamp.to_sec() > 8 and m.pose.pose.position.x < -13' demo.launch real_time_factor:=0.2
 #   screenshot_rviz.sh docs/images/rviz_replay.png /odometry/filtered 'm.header.stamp.to_sec() > 95806' \
-#     replay.launch localizer:=particle_filter rate:=6 bag:=/path/to/hk_tst_20210517_ublox.bag
+#     replay.launch rate:=6 bag:=/path/to/hk_tst_20210517_ublox.bag
 #   screenshot_rviz.sh docs/images/rviz_city.png /ground_truth/odom 'm.header.stamp.to_sec() > 1777863655' \
 #     demo.launch scenario:=downtown_grid real_time_factor:=0.5
 #   screenshot_rviz.sh docs/images/rviz_occlusion.png /ground_truth/odom 'm.header.stamp.to_sec() > 1777863632' \
