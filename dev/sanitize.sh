@@ -25,6 +25,7 @@ cmake --build "$build" --parallel "$(nproc)" --target "${rooms[@]/%/_tests}" >> 
 
 export ASAN_OPTIONS=strict_string_checks=1:detect_stack_use_after_return=1:check_initialization_order=1
 export UBSAN_OPTIONS=print_stacktrace=1
+export LD_LIBRARY_PATH=$build/devel/lib:$LD_LIBRARY_PATH  # before the libraries of the usual build
 for room in "${rooms[@]}"; do
   echo "== $room"
   "$build/devel/lib/urban_gnss_localization/${room}_tests" --gtest_brief=1

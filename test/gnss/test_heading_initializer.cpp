@@ -26,11 +26,11 @@ struct Drive {
   }
   Pose2 truth(int second) const { return compose(map_from_odometry, odometry(second)); }
   LocalFix fix(int second, std::mt19937_64& generator) const {
-    std::normal_distribution<double> noise(0.0, sigma);
+    std::normal_distribution<double> normal;
     LocalFix result;
     result.stamp = from_seconds(1000.0 + second);
-    const double east = noise(generator);
-    const double north = noise(generator);
+    const double east = sigma * normal(generator);
+    const double north = sigma * normal(generator);
     result.position = truth(second).position() + Eigen::Vector2d(east, north);
     result.covariance = declared_sigma * declared_sigma * Eigen::Matrix2d::Identity();
     return result;
