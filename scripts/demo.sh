@@ -5,7 +5,7 @@
 #
 #   scripts/demo.sh [--quick] [--seeds N] [--rviz] [--output DIR]
 #
-#   --quick       two minutes of the city, 4 seeds and one live lap instead of a whole drive, 30 and three
+#   --quick       4 seeds and one live lap instead of 30 and three
 #   --seeds N     so many seeds
 #   --rviz        show the live part in rviz (where DISPLAY is set)
 #   --output DIR  folder of the results (default results/demo of this clone)
@@ -105,11 +105,9 @@ run() {
   return $status
 }
 
-city_seconds=900  # more than the drive has
-if $quick; then city_seconds=120; fi
 echo "== city: downtown_grid"
 {
-  run "$programs/simulate" --scenario downtown_grid --without-lidar --duration $city_seconds --output "$scratch/city.bag"
+  run "$programs/simulate" --scenario downtown_grid --without-lidar --output "$scratch/city.bag"
   for localizer in imm_ekf ekf; do
     run "$programs/replay" "$scratch/city.bag" --localizer $localizer --output "$scratch/$localizer.bag"
   done

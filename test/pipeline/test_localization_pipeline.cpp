@@ -1,3 +1,5 @@
+#include <algorithm>
+
 #include "pipeline_rig.hpp"
 #include "urban_gnss_localization/gnss/covariance_filter.hpp"
 #include "urban_gnss_localization/localizers/nishida/particle_filter.hpp"
@@ -163,6 +165,10 @@ TEST(LocalizationPipeline, NonFiniteMessagesChangeNothing) {
       rig.drive(0.1 * k);
     }
     for (const LocalizationOutput& output : rig.pipeline.take_outputs()) outputs.push_back(output);
+    const auto events = rig.pipeline.take_events();
+    EXPECT_EQ(with_bad_ones, std::any_of(events.begin(), events.end(), [](const PipelineEvent& event) {
+                return event.text.find("odometry left out: ") != std::string::npos;
+              }));
     return std::make_pair(outputs, rig.pipeline.report());
   };
   const auto [clean, clean_report] = run(false);
