@@ -13,7 +13,6 @@
 #include <iterator>
 #include <nlohmann/json.hpp>
 #include <optional>
-#include <set>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -22,6 +21,7 @@
 #include "command_line.hpp"
 #include "files/bag_reader.hpp"
 #include "files/output_file.hpp"
+#include "replay/several_recordings.hpp"
 #include "replay/text_counts.hpp"
 #include "urban_gnss_localization/evaluation/report_json.hpp"
 #include "urban_gnss_localization/evaluation/stamp_text.hpp"
@@ -218,7 +218,8 @@ void write_run(const Run& run, const std::optional<TrajectoryErrors>& fixes, Sta
 /// All that is known of the estimates in the bags.
 struct Results {
   std::vector<TrackReport> reports;
-  std::vector<Run> runs;  ///< where there is a truth
+  std::vector<TrackSummary> summaries;  ///< of the reports
+  std::vector<Run> runs;                ///< where there is a truth
 };
 
 /// Reads one bag, scores it where there is a truth, and writes its series.
@@ -257,7 +258,10 @@ void evaluate_bag(const std::string& path, const BagReader& bag, const BagReader
     write_trajectory(tum, inputs, drive.truth->trajectory);
     for (const Run& run : runs) write_run(run, fixes, drive.truth->trajectory.front().stamp, options, inputs);
   }
-  std::move(reports.begin(), reports.end(), std::back_inserter(results.reports));
+  for (TrackReport& report : reports) {
+    results.summaries.push_back(urban_gnss::summarize(report, options.max_gap()));
+    results.reports.push_back(std::move(report));
+  }
   std::move(runs.begin(), runs.end(), std::back_inserter(results.runs));
 }
 
@@ -345,8 +349,9 @@ void write_folder(const Results& results, const std::string& command, const Opti
   nlohmann::json metrics = {
       {"command", command}, {"runs", nlohmann::json::object()}, {"tracks", nlohmann::json::object()}};
   for (const Run& run : results.runs) metrics["runs"][run.name] = urban_gnss::to_json(run.errors.summary);
-  for (const TrackReport& report : results.reports) {
-    const TrackSummary summary = urban_gnss::summarize(report, options.max_gap());
+  for (std::size_t i = 0; i < results.reports.size(); ++i) {
+    const TrackReport& report = results.reports[i];
+    const TrackSummary& summary = results.summaries[i];
     metrics["tracks"][report.name] = urban_gnss::to_json(summary);
     const fs::path file = output / "data" / ("track_" + as_file_name(report.name) + ".json");
     urban_gnss::write_file(file, inputs, [&](std::ostream& out) {
@@ -363,13 +368,7 @@ void evaluate(const Options& options, const std::string& command, const InputFil
   if (options.output.empty() && options.kml_file.empty() && options.gpx_file.empty() && options.geojson_file.empty()) {
     throw std::runtime_error("nothing to write: give --output, --kml, --gpx or --geojson");
   }
-  std::set<std::string> stems;
-  for (const std::string& bag : options.bags) {
-    const std::string stem = fs::path(bag).stem().string();
-    if (!stems.insert(stem).second) {
-      throw std::runtime_error("two bags are called " + stem + ": their results would share one name");
-    }
-  }
+  urban_gnss::require_names_of_their_own(options.bags);
   std::optional<BagReader> truth_bag;
   if (!options.truth_bag.empty()) truth_bag.emplace(options.truth_bag);
 
@@ -379,8 +378,8 @@ void evaluate(const Options& options, const std::string& command, const InputFil
     evaluate_bag(bag, opened, truth_bag ? *truth_bag : opened, options, inputs, results);
   }
   if (results.runs.empty()) {
-    for (const TrackReport& report : results.reports) {
-      print_track(std::cout, report, urban_gnss::summarize(report, options.max_gap()));
+    for (std::size_t i = 0; i < results.reports.size(); ++i) {
+      print_track(std::cout, results.reports[i], results.summaries[i]);
     }
   } else {
     print_table(std::cout, results.runs);

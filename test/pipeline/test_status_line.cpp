@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include "tracking_report.hpp"
 #include "urban_gnss_localization/pipeline/status_line.hpp"
 
 namespace {
@@ -9,27 +10,18 @@ using urban_gnss::LocalizationReport;
 using urban_gnss::LocalizationState;
 using urban_gnss::status_line;
 using urban_gnss::StatusLevel;
-
-LocalizationReport tracking() {
-  LocalizationReport report;
-  report.state = LocalizationState::kTracking;
-  report.healthy = true;
-  report.position_sigma_m = 1.24;
-  report.fixes_used = 34;
-  report.fixes_rejected = 1;
-  return report;
-}
+using urban_gnss::tracking_report;
 
 TEST(StatusLine, InAWord) {
-  EXPECT_EQ(status_line(tracking()), "OK: 1.2 m, 34 of 35 fixes used");
-  LocalizationReport report = tracking();
+  EXPECT_EQ(status_line(tracking_report()), "OK: 1.2 m, 34 of 35 fixes used");
+  LocalizationReport report = tracking_report();
   report.position_sigma_m = 123.4;
   report.reason = "gps/fix declares HDOP^2";
   EXPECT_EQ(status_line(report), "OK: gps/fix declares HDOP^2; 123 m, 34 of 35 fixes used");
 }
 
 TEST(StatusLine, WhatIsWrongComesFirst) {
-  LocalizationReport report = tracking();
+  LocalizationReport report = tracking_report();
   report.state = LocalizationState::kDeadReckoning;
   report.healthy = false;
   report.reason = "no fix was used for 12 s";
@@ -47,7 +39,7 @@ TEST(StatusLine, WithoutAnEstimate) {
 }
 
 TEST(StatusLine, AGateThatFindsNothingIsAWarning) {
-  LocalizationReport report = tracking();
+  LocalizationReport report = tracking_report();
   report.is_gate_inert = true;
   EXPECT_EQ(level_of(report), StatusLevel::kWarn);
 }

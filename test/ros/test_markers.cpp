@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include "tracking_report.hpp"
 #include "urban_gnss_localization/ros/markers.hpp"
 
 namespace {
@@ -7,15 +8,11 @@ namespace {
 using urban_gnss::LocalizationReport;
 using urban_gnss::LocalizationState;
 using urban_gnss::status_marker;
+using urban_gnss::tracking_report;
 using visualization_msgs::Marker;
 
 TEST(StatusMarker, GoesAlongWithTheRobotAndSaysHowItIs) {
-  LocalizationReport report;
-  report.state = LocalizationState::kTracking;
-  report.healthy = true;
-  report.position_sigma_m = 1.24;
-  report.fixes_used = 34;
-  report.fixes_rejected = 1;
+  LocalizationReport report = tracking_report();
   const Marker marker = status_marker(report, "robot1/base_link");
   EXPECT_EQ(marker.type, Marker::TEXT_VIEW_FACING);
   EXPECT_EQ(marker.header.frame_id, "robot1/base_link");

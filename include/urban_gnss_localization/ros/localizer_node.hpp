@@ -61,8 +61,8 @@ struct LocalizerNodeParameters {
 ///
 /// Subscribes odom, gps/fix, initialpose, gps/datum; gps/bias, gps/velocity and gps/satellites where the filter wants
 /// them; imu/data where use_imu_yaw_rate is set. Publishes odometry/filtered and gps/filtered, tf map -> odom, ~status,
-/// and gps/datum (latched) where it found the datum itself. ~state_file: StateKeeper. Services set_pose, datum, toLL, fromLL, toLLArray,
-/// fromLLArray, ~reset.
+/// and gps/datum (latched) where it found the datum itself. ~state_file: StateKeeper. Services set_pose, datum, toLL,
+/// fromLL, toLLArray, fromLLArray, ~reset.
 class LocalizerNode {
  public:
   using OutputHook = std::function<void(const LocalizationOutput&)>;

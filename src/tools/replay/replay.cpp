@@ -192,6 +192,7 @@ std::string line_of(const nlohmann::json& metrics) {
 
 /// Each bag for itself; throws std::runtime_error where one of them failed.
 void run_each(const ReplayOptions& options, int jobs, const LocalizerRegistry& localizers, const InputFiles& files) {
+  if (!(options.output + options.json_file + options.tum_file).empty()) require_names_of_their_own(options.bags);
   const auto names = [&](const std::string& folder, const char* extension) {
     return folder.empty() ? std::vector<std::string>(options.bags.size())
                           : files_beside(folder, options.bags, extension);

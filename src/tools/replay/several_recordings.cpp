@@ -96,15 +96,22 @@ void run_in_processes(std::size_t count, int jobs, const std::function<std::stri
   }
 }
 
-std::vector<std::string> files_beside(const std::string& folder, const std::vector<std::string>& bags,
-                                      const std::string& extension) {
-  std::vector<std::string> files;
+void require_names_of_their_own(const std::vector<std::string>& bags) {
   std::set<std::string> stems;
   for (const std::string& bag : bags) {
     const std::string stem = std::filesystem::path(bag).stem().string();
-    if (!stems.insert(stem).second)
+    if (!stems.insert(stem).second) {
       throw std::runtime_error("two bags are named " + stem + ": their results would be one");
-    files.push_back((std::filesystem::path(folder) / (stem + extension)).string());
+    }
+  }
+}
+
+std::vector<std::string> files_beside(const std::string& folder, const std::vector<std::string>& bags,
+                                      const std::string& extension) {
+  std::vector<std::string> files;
+  for (const std::string& bag : bags) {
+    files.push_back(
+        (std::filesystem::path(folder) / (std::filesystem::path(bag).stem().string() + extension)).string());
   }
   return files;
 }

@@ -18,7 +18,10 @@ struct RecordingResult {
 void run_in_processes(std::size_t count, int jobs, const std::function<std::string(std::size_t)>& work,
                       const std::function<void(std::size_t, const RecordingResult&)>& report);
 
-/// "results/drive.json" of a folder and a bag's name. Throws std::runtime_error where two bags have one name.
+/// Throws std::runtime_error where two bags have one name, so that their results would, too.
+void require_names_of_their_own(const std::vector<std::string>& bags);
+
+/// "results/drive.json" of a folder and each bag's name. Requires names of their own.
 std::vector<std::string> files_beside(const std::string& folder, const std::vector<std::string>& bags,
                                       const std::string& extension);
 
