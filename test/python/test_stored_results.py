@@ -7,18 +7,19 @@ import sys
 import unittest
 
 ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..")
-sys.path.insert(0, os.path.join(ROOT, "reports"))
+sys.path[:0] = [os.path.join(ROOT, folder) for folder in ("reports", "dev")]
 
 
-def load(name):
-    """A script of reports/ as a module."""
-    spec = importlib.util.spec_from_file_location(name, os.path.join(ROOT, "reports", name + ".py"))
+def load(name, folder="reports"):
+    """A script as a module."""
+    spec = importlib.util.spec_from_file_location(name, os.path.join(ROOT, folder, name + ".py"))
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
 
 
 plot_bias_experiment, occlusion_report = load("plot_bias_experiment"), load("occlusion_report")
+benchmarks = load("benchmarks", "dev")
 
 
 def read_text(*names):
@@ -128,6 +129,24 @@ class StoredResults(unittest.TestCase):
         self.assertGreater(len(rows), 12)
         for row in rows:
             self.assertIn(row, self.page)
+
+    def test_benchmarks(self):
+        """The page is as the script writes it, and holds every row."""
+        page, results = read_text("docs", "results", "benchmarks.md"), stored("benchmarks")
+        self.assertEqual(benchmarks.of_page(page, results), page)
+        for rows in benchmarks.TABLES.values():
+            for row in rows:
+                for name in [row[1]] + [name for _, name in row[3]]:
+                    self.assertIn(name, results["results"])
+
+    def test_what_the_benchmarks_say_where_we_lose(self):
+        """A goal that is missed, and a library that is faster."""
+        results = {name: {"median_s": seconds} for name, seconds in (("ours", 2e-6), ("faster", 1e-6), ("slow", 0.0123))}
+        table = benchmarks.table_of((("work", "ours", 1e-6, (("A", "faster"), ("B", "slow"))),), results)
+        self.assertEqual(table.splitlines()[2:], ["| work | 2.00 µs | 1.00 µs, **missed** |  |",
+                                                  "| – A | 1.00 µs, × 0.50 | | `faster` |",
+                                                  "| – B | 12.3 ms, × 6150 | | `slow` |"])
+        self.assertNotIn("missed", benchmarks.table_of((("work", "ours", 2e-6, ()),), results))
 
 
 if __name__ == "__main__":
