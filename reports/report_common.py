@@ -34,7 +34,6 @@ METHOD_COLOURS = {
     "conventional": "#d55e00",
     "literal": "#aa3377",
     "switching": "#009e73",
-    "imm": "#56b4e9",
     "imm_ekf": "#56b4e9",
     "ekf": "#e69f00",
     "dead_reckoning": "#8a8a8a",

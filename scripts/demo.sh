@@ -117,7 +117,7 @@ run "$programs/evaluate" "$scratch/imm_ekf.bag" "$scratch/ekf.bag" --truth "$scr
 
 echo "== experiment: $seeds seeds"
 run "$programs/paper_experiment" --seeds "$seeds" --laps 3 --noise-scale 1e-6 --bias-direction random \
-  --methods paper,paper_ring_1,switching,imm,conventional,literal,dead_reckoning,oracle_zone,oracle \
+  --methods paper,paper_ring_1,switching,imm_ekf,conventional,literal,dead_reckoning,oracle_zone,oracle \
   --plots "$output" --json "$output/metrics.json"
 
 # Ends when the simulated time has come, or fails when the simulation does not go on.

@@ -163,7 +163,7 @@ const std::vector<PaperMethod>& paper_methods() {
          c.filter.likelihood = LikelihoodChoice::kProduct;
        }},
       {"switching", Kind::kSwitching, "switching bias, Rao-Blackwellized particle filter", [](auto&) {}},
-      {"imm", Kind::kImm, "switching bias, interacting multiple models", [](auto&) {}},
+      {"imm_ekf", Kind::kImm, "switching bias, interacting multiple models", [](auto&) {}},
       {"dead_reckoning", Kind::kDeadReckoning, "the inputs alone", [](auto&) {}},
       {"oracle_zone", Kind::kOracleZone, "knows the shadow and drops the fix there", make_oracle},
       {"oracle", Kind::kOracle, "knows the shadow and the bias", make_oracle},

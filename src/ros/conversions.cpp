@@ -232,6 +232,7 @@ msgs::FixDecision to_message(const FixOutcome& outcome) {
   msgs::FixDecision message;
   message.stamp = to_ros(outcome.stamp);
   message.decision = static_cast<std::uint8_t>(outcome.decision);
+  message.decision_name = to_string(outcome.decision);
   message.nis = outcome.nis;
   message.nis_threshold = outcome.nis_threshold;
   message.nis_dof = static_cast<std::uint8_t>(outcome.nis_dof);
@@ -295,6 +296,7 @@ msgs::LocalizationStatus to_message(const LocalizationReport& report, const Loca
   message.localizer = localizer.name();
   message.mode = localizer.mode();
   message.state = static_cast<std::uint8_t>(report.state);
+  message.state_name = to_string(report.state);
   message.healthy = report.healthy;
   message.reason = report.reason;
   message.last_fix = to_message(report.last_fix);

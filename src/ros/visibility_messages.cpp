@@ -212,6 +212,7 @@ msgs::Visibility to_message(const FixAssessment& assessment, const std::optional
   message.header.frame_id = frame;
   message.model = enum_name(parameters.model);
   message.source = static_cast<std::uint8_t>(covariance.source);
+  message.source_name = to_string(covariance.source);
   message.missing = assessment.missing;
   message.doubt = assessment.doubt;
   message.strong_share = static_cast<float>(assessment.strong_share);

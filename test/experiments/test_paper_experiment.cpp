@@ -73,7 +73,7 @@ TEST(PaperExperiment, ProposedFilterBeatsTheConventionalOneAndNoneBeatsTheOracle
 
 // Reference (30 seeds, 3 laps): 0.12 m in the shadow, 0.02 to 0.04 m in the sun.
 TEST(PaperExperiment, SwitchingFiltersComeNearTheOracle) {
-  for (const char* name : {"switching", "imm"}) {
+  for (const char* name : {"switching", "imm_ekf"}) {
     for (int seed = 101; seed <= 103; ++seed) {
       const Errors errors = run(name, conditions(seed));
       EXPECT_LT(errors.sun, 0.1) << name << " " << seed;
@@ -98,7 +98,7 @@ TEST(PaperExperiment, EveryMethodDrivesWithinItsTime) {
     const auto longest = static_cast<std::size_t>(1.5 * 2.0 * kPi * 15.0 / 10.0 / 0.01);
     EXPECT_GT(errors.estimates.size(), 800u) << m.name;
     EXPECT_LE(errors.estimates.size(), longest) << m.name;
-    const bool has_particles = m.name != "dead_reckoning" && m.name != "imm";
+    const bool has_particles = m.name != "dead_reckoning" && m.name != "imm_ekf";
     EXPECT_EQ(errors.steps_with_particles, has_particles ? int(errors.estimates.size()) : 0) << m.name;
     EXPECT_NE(m.description, "");
   }

@@ -176,15 +176,15 @@ class Messages(unittest.TestCase):
     message."""
 
     FROZEN = {
-        "msg/FixDecision.msg": "c794102ac9acef44c80a49fc1244f732",
+        "msg/FixDecision.msg": "edc809962c7c10f9160f942cd5915cef",
         "msg/GpsBias.msg": "45a287636aa2c9914d0d93719a680ca3",
-        "msg/LocalizationStatus.msg": "b3ff4a15ab3d8708e30860421b46ba7c",
+        "msg/LocalizationStatus.msg": "a9c32b85e825b38fc4c9a4dc7628f717",
         "msg/Satellite.msg": "93bc2dfc23afaf8c6156d061958c9572",
         "msg/SatelliteArray.msg": "87c065d93348d099c8fc746eab00e71e",
         "msg/SatelliteVisibility.msg": "a1303f736a71d12994fb74b9bcb6d512",
         "msg/SignalPath.msg": "0996e849d07a3a710dcac76b58ce8c4f",
         "msg/SignalPathArray.msg": "38d5900665dd9980ee5b289d8b564291",
-        "msg/Visibility.msg": "15e2a2399d92802248fe1fce48e34b25",
+        "msg/Visibility.msg": "361157ab40bd3971a918267c7d5f7b6f",
         "srv/FromLL.srv": "13e9f7cfebfbd87f426e7e6b518ef966",
         "srv/FromLLArray.srv": "9e3b0fdb28d8035c7f91988e99493d24",
         "srv/SaveMap.srv": "dbc7586f7a24c278876f050a9aeb9f48",

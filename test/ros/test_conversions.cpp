@@ -55,6 +55,16 @@ TEST(Conversions, WhatADriverSaysOfUsedSatellitesIsNotReliedOn) {
   }
 }
 
+// rostopic echo shows numbers only; who reads them should not need the definition beside them.
+TEST(Conversions, EnumerationsAreSaidInWords) {
+  FixOutcome outcome;
+  outcome.decision = FixDecision::kRejectedGate;
+  EXPECT_EQ(to_message(outcome).decision_name, "rejected_gate");
+  FixAssessment assessment;
+  assessment.covariance.source = VisibilitySource::kLidarAndSatellites;
+  EXPECT_EQ(to_message(assessment, std::nullopt, {}, ros::Time(1.0), "map").source_name, "lidar_and_satellites");
+}
+
 TEST(Conversions, WhatAPlanarFilterDoesNotEstimateHasALargeVariance) {
   LocalizationOutput output;
   output.estimate.covariance << 4.0, 1.0, 0.1, 1.0, 9.0, 0.2, 0.1, 0.2, 0.01;
