@@ -446,9 +446,13 @@ def in_order(methods, order):
     return {name: methods[name] for name in known + [name for name in methods if name not in known]}
 
 
+def metrics_of_city(directory):
+    return os.path.join(directory, CITY, "metrics.json")
+
+
 def add_city(page, directory):
     """A drive through a simulated city, where demo.sh has made one: the first screen."""
-    path = os.path.join(directory, CITY, "metrics.json")
+    path = metrics_of_city(directory)
     if not os.path.exists(path):
         return
     runs = common.require_object(common.read_json(path), "runs", path)
@@ -488,7 +492,9 @@ def make_report(directory):
     def output(name):
         return os.path.join(directory, name)
 
-    page = common.HtmlPage("The experiment of Nishida et al. (2013)", directory)
+    has_city = os.path.exists(metrics_of_city(directory))
+    page = common.HtmlPage("{}he experiment of Nishida et al. (2013)".format(
+        "A drive through a city, and t" if has_city else "T"), directory)
     add_city(page, directory)
     page.paragraph(introduction(metrics))
     page.heading("Results")

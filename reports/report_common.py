@@ -51,6 +51,7 @@ table { border-collapse: collapse; margin: 1em 0; font-size: 0.92em; }
 img { max-width: 100%; height: auto; }
 """
 STYLE = BASIC_STYLE + """
+table { display: block; overflow-x: auto; }
 th, td { padding: 0.3em 0.8em; border-bottom: 1px solid #ddd; text-align: right; white-space: nowrap; }
 th { border-bottom: 2px solid #888; vertical-align: bottom; }
 th:first-child, td:first-child { text-align: left; }

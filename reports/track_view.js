@@ -146,7 +146,8 @@ class View {
     }
     this.shown = { estimates: true, truth: true, fixes: true, ellipses: true };
     this.hidden = new Set();  // names of reports
-    this.chosen = reports[0];  // whose decisions the fixes have
+    const says = report => report.fixes.decision.some(decision => decision !== "unknown");
+    this.chosen = reports.find(says) || reports[0];  // whose decisions the fixes have
     this.cursor = null;       // s
     this.surfaces = [];
   }
@@ -539,6 +540,7 @@ function addControls(parent, view, map) {
     const label = element(box, "label", "as decided by ");
     const choice = element(label, "select");
     view.reports.forEach((report, i) => element(choice, "option", report.name, { value: i }));
+    choice.value = view.reports.indexOf(view.chosen);
     choice.addEventListener("change", () => { view.chosen = view.reports[choice.value]; view.request(); addLegend(); });
   }
   element(box, "button", "whole drive").addEventListener("click", () => map.fit());

@@ -2,6 +2,11 @@
 #
 #   . scripts/environment.sh
 
+if [ -z "$BASH_VERSION$ZSH_VERSION" ]; then
+  echo "environment.sh: for bash or zsh, not for sh" >&2
+  return 1
+fi
+
 _urban_gnss_root=$(cd "$(dirname "${BASH_SOURCE[0]:-${(%):-%x}}")/.." && pwd)
 _urban_gnss_shell=${ZSH_VERSION:+zsh}
 _urban_gnss_shell=${_urban_gnss_shell:-bash}
@@ -18,6 +23,9 @@ if [ -f "/opt/ros/noetic/setup.$_urban_gnss_shell" ]; then
 fi
 if [ -f "$_urban_gnss_root/.workspace/devel/setup.$_urban_gnss_shell" ]; then
   . "$_urban_gnss_root/.workspace/devel/setup.$_urban_gnss_shell"
+fi
+if [ ! -d "$_urban_gnss_root/.workspace/devel" ] && [[ $- == *i* ]]; then
+  echo "environment.sh: this package is not built yet: $_urban_gnss_root/scripts/setup.sh" >&2
 fi
 # Completion with the tab key, where somebody types. Debian's rosbash is no part of setup.bash.
 if [ -n "$BASH_VERSION" ] && [[ $- == *i* ]]; then

@@ -22,6 +22,11 @@ constexpr double kContradict = 0.2;
 /// Yaw rates of wheels that skid, and poses whose heading is another sensor's, differ by more.
 constexpr double kAgreeTurning = 0.2;
 constexpr double kContradictTurning = 0.35;
+/// A difference that has no name is one only where it adds up over the window, or is larger in each half second than the
+/// noise of a yaw rate that is rounded, jitters or comes late. Wheels that skid differ by 0.05 rad (Husky), and turn as
+/// far as their pose.
+constexpr double kOffTurn_rad = 0.5;
+constexpr double kOffBlock_rad = 0.1;
 /// Share of the squares that a named fault may leave unexplained.
 constexpr double kUnexplained = 0.06;
 /// A factor that is no error of wheels.
@@ -140,7 +145,11 @@ std::optional<TwistFinding> judge_turn(const Window& w) {
   if (difference < kContradictTurning) return std::nullopt;
   if (w.twist_square < kNoWay * w.pose_square) return is(TwistFault::kZero);
   if (w.pose_square == 0.0) return is(TwistFault::kPoseStands);
-  if (1.0 - square(product) / (w.pose_square * w.twist_square) > 4.0 * kUnexplained) return found;
+  if (1.0 - square(product) / (w.pose_square * w.twist_square) > 4.0 * kUnexplained) {
+    const double mean_square = (w.pose_square + w.twist_square - 2.0 * product) / w.count;
+    if (std::abs(w.off) < kOffTurn_rad && mean_square < square(kOffBlock_rad)) return std::nullopt;
+    return found;
+  }
   found.factor = w.twist_square / product;
   return is(product < 0.0 ? TwistFault::kReversed : TwistFault::kScaled);
 }
@@ -165,6 +174,7 @@ void TwistCheck::close_block() {
     window.pose_twist += pose * std::conj(twist);
     window.by_pose += std::abs(pose);
     window.by_twist += std::abs(twist);
+    window.off += pose - twist;
   };
   add(speed_.window, block_.by_pose, block_.by_twist);
   speed_.window.fixed_square += std::norm(block_.by_fixed_twist);

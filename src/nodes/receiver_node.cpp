@@ -5,6 +5,8 @@
 #include <ros/ros.h>
 #include <topic_tools/shape_shifter.h>
 
+#include <algorithm>
+
 #include "urban_gnss_localization/receivers/receiver_input.hpp"
 #include "urban_gnss_localization/ros/conversions.hpp"
 #include "urban_gnss_localization/ros/node_parameters.hpp"
@@ -66,7 +68,10 @@ class ReceiverNode {
     ros::master::V_TopicInfo all;
     ros::master::getTopics(all);
     std::string names;
+    ros::V_string own;
+    ros::this_node::getAdvertisedTopics(own);
     for (const ros::master::TopicInfo& info : all) {
+      if (std::find(own.begin(), own.end(), info.name) != own.end()) continue;
       for (const ReceiverTopic& topic : preset_.topics) {
         const bool is_so_called = namespace_of(without_leading_slash(info.name), topic).has_value();
         if (is_so_called && is_type_of(topic, info.datatype)) names += " " + info.name;

@@ -2,9 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <optional>
 #include <utility>
+
+#include "urban_gnss_localization/parameters/edit_distance.hpp"
 
 namespace urban_gnss {
 namespace {
@@ -30,21 +31,6 @@ constexpr std::pair<const char*, const char*> kFormerNames[] = {
     {"satellites_timeout", "satellites_wait"},
     {"satellites_timeout", "satellites_max_age"},
 };
-
-std::size_t edit_distance(const std::string& a, const std::string& b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  std::iota(row.begin(), row.end(), 0);
-  for (std::size_t i = 1; i <= a.size(); ++i) {
-    std::size_t diagonal = row[0];
-    row[0] = i;
-    for (std::size_t j = 1; j <= b.size(); ++j) {
-      const std::size_t above = row[j];
-      row[j] = std::min({row[j] + 1, row[j - 1] + 1, diagonal + (a[i - 1] == b[j - 1] ? 0 : 1)});
-      diagonal = above;
-    }
-  }
-  return row[b.size()];
-}
 
 std::string last_name(const std::string& path) { return path.substr(path.rfind('.') + 1); }
 

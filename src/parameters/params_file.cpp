@@ -1,7 +1,12 @@
 #include "urban_gnss_localization/parameters/params_file.hpp"
 
+#include "urban_gnss_localization/parameters/edit_distance.hpp"
+
 namespace urban_gnss {
 namespace {
+
+/// Letters by which a name that is meant is misspelt.
+constexpr std::size_t kMostSlips = 2;
 
 /// "/robot1/imm_ekf/direct_sigma" has the part "imm_ekf".
 bool has_part(const std::string& path, const std::string& part) {
@@ -37,6 +42,13 @@ ParamsFileFindings look_through_params(const YAML::Node& file, const std::string
   }
   if (found.faults.empty() && !holds_section(file, node)) {
     std::string sections;
+    for (const auto& entry : file) {
+      const std::string name = entry.first.as<std::string>("");
+      if (edit_distance(name, node) <= kMostSlips) {
+        found.faults.push_back("section " + name + " is not read; did you mean " + node + "?");
+      }
+    }
+    if (!found.faults.empty()) return found;
     for (const auto& entry : file) sections += (sections.empty() ? "" : ", ") + entry.first.as<std::string>("?");
     found.hint = "has no section " + node + ", but " + sections + ": this node takes nothing from it";
   }

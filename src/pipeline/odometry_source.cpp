@@ -71,7 +71,8 @@ std::string cause_of(const TwistFinding& finding) {
       text << std::setprecision(3) << "a factor of " << finding.factor << ": wrong units, or a wrong wheel radius?";
       return text.str();
     }
-    case TwistFault::kUnexplained: return "is the twist, or the pose, of another frame?";
+    case TwistFault::kUnexplained:
+      return "not at the same times, or not in the same direction: is the twist, or the pose, of another frame?";
   }
   return "";
 }

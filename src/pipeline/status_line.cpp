@@ -31,7 +31,12 @@ std::string status_line(const LocalizationReport& report) {
     line << std::fixed << std::setprecision(report.position_sigma_m < 10.0 ? 1 : 0) << report.position_sigma_m
          << " m, ";
   }
-  line << report.fixes_used << " of " << report.fixes_used + report.fixes_rejected << " fixes used";
+  const std::uint64_t examined = report.fixes_used + report.fixes_rejected;
+  if (examined == 0 && report.last_fix.stamp != Stamp(0)) {
+    line << "fixes come, none was examined yet";
+  } else {
+    line << report.fixes_used << " of " << examined << " fixes used";
+  }
   return line.str();
 }
 

@@ -1,10 +1,12 @@
 #include "urban_gnss_localization/ros/map_services.hpp"
 
+#include <cmath>
 #include <sstream>
 #include <string>
 #include <vector>
 
 #include "urban_gnss_localization/geometry/pose_faults.hpp"
+#include "urban_gnss_localization/gnss/position_hint.hpp"
 
 namespace urban_gnss {
 namespace {
@@ -44,6 +46,25 @@ GeodeticPosition place_of(const geometry_msgs::Point& point, const LocalFrame& m
   return place;
 }
 
+/// What a place that far from the datum has come from is a mistake: of signs, of the order, or another city's.
+constexpr double kFarthest_m = 1e6;
+/// Where a place must be to be meant rather than the far one.
+constexpr double kNear_m = 1e5;
+
+/// The point of the map frame, or why there is none: in `fault`.
+geometry_msgs::Point point_of(const GeodeticPosition& place, const LocalFrame& map, std::string& fault) {
+  fault = joined(position_faults(place));
+  if (!fault.empty()) return {};
+  const Eigen::Vector3d position = map.to_local(place);
+  if (position.norm() <= kFarthest_m) return to_point(position);
+  std::ostringstream out;
+  out << "the place is " << std::lround(1e-3 * position.norm()) << " km from the datum: must be within "
+      << std::lround(1e-3 * kFarthest_m) << " km";
+  const std::string hint = hint_of_far_place(place, map, kNear_m);
+  fault = out.str() + (hint.empty() ? "" : "; " + hint);
+  return {};
+}
+
 std::string element(std::size_t index) { return "element " + std::to_string(index) + ": "; }
 
 /// Why the lengths do not fit; empty where they do.
@@ -67,9 +88,8 @@ srv::FromLL::Response answer(const srv::FromLL::Request& request, const MapFrame
     return response;
   }
   const GeodeticPosition place{request.latitude, request.longitude, request.altitude};
-  response.message = joined(position_faults(place));
+  response.map_point = point_of(place, *map, response.message);
   response.success = response.message.empty();
-  if (response.success) response.map_point = to_point(map->to_local(place));
   return response;
 }
 
@@ -97,13 +117,13 @@ srv::FromLLArray::Response answer(const srv::FromLLArray::Request& request, cons
   for (std::size_t i = 0; i < request.latitudes.size(); ++i) {
     const double altitude = request.altitudes.empty() ? map->datum().altitude_m : request.altitudes[i];
     const GeodeticPosition place{request.latitudes[i], request.longitudes[i], altitude};
-    const std::string fault = joined(position_faults(place));
+    std::string fault;
+    response.map_points.push_back(point_of(place, *map, fault));
     if (!fault.empty()) {
       response.message = element(i) + fault;
       response.map_points.clear();
       return response;
     }
-    response.map_points.push_back(to_point(map->to_local(place)));
   }
   response.success = true;
   return response;

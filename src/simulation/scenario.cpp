@@ -1,5 +1,6 @@
 #include "urban_gnss_localization/simulation/scenario.hpp"
 
+#include <algorithm>
 #include <boost/date_time/posix_time/posix_time.hpp>
 #include <cmath>
 #include <filesystem>
@@ -271,7 +272,25 @@ Stamp parse_utc(const std::string& text) {
   }
 }
 
+namespace {
+
+/// Names of the scenarios beside a file that is not there.
+std::string names_beside(const std::filesystem::path& file) {
+  std::vector<std::string> names;
+  std::error_code error;
+  for (const auto& entry : std::filesystem::directory_iterator(file.parent_path(), error)) {
+    if (entry.path().extension() == ".yaml") names.push_back(entry.path().stem());
+  }
+  std::sort(names.begin(), names.end());
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "; there are " : ", ") + name;
+  return text;
+}
+
+}  // namespace
+
 Scenario load_scenario(const std::string& file, const std::vector<std::string>& overrides) {
+  if (!std::filesystem::exists(file)) throw std::runtime_error(file + ": no such file" + names_beside(file));
   const YAML::Node root = load_map(file);
   if (root.size() == 0) throw std::runtime_error(file + ": must be a map of names to values");
   for (const std::string& text : overrides) assign(root, text);

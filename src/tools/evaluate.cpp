@@ -275,7 +275,7 @@ void print_table(std::ostream& out, const std::vector<Run>& runs) {
     } else {
       text << std::fixed << std::setprecision(decimals) << value;
     }
-    out << std::right << std::setw(column_width) << text.str();
+    out << ' ' << std::right << std::setw(column_width - 1) << text.str();  // apart, however long it is
   };
   out << std::left << std::setw(static_cast<int>(width)) << "name" << std::right << std::setw(9) << "samples"
       << std::setw(10) << "coverage" << std::setw(9) << "median" << std::setw(9) << "mean" << std::setw(9) << "sigma"
@@ -365,9 +365,6 @@ void write_folder(const Results& results, const std::string& command, const Opti
 }
 
 void evaluate(const Options& options, const std::string& command, const InputFiles& inputs) {
-  if (options.output.empty() && options.kml_file.empty() && options.gpx_file.empty() && options.geojson_file.empty()) {
-    throw std::runtime_error("nothing to write: give --output, --kml, --gpx or --geojson");
-  }
   urban_gnss::require_names_of_their_own(options.bags);
   std::optional<BagReader> truth_bag;
   if (!options.truth_bag.empty()) truth_bag.emplace(options.truth_bag);

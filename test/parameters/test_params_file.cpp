@@ -21,6 +21,7 @@ TEST(ParamsFile, WhatNobodyReadsIsRefused) {
   const std::pair<const char*, const char*> cases[] = {
       {"{direct_sigma: 4, antenna_offset: [0.1, 0]}", "direct_sigma stands outside of a section"},
       {"imm_ekf_node: {direct_sigma: 4}", "the node is called imm_ekf"},
+      {"{imm_efk: {direct_sigma: 4}, ukf: {}}", "section imm_efk is not read; did you mean imm_ekf?"},
       {"{imm_ekf: {direct_sigma: 4}, publish_tf: false}", "publish_tf stands outside"},
       {"expert: {imu: {use_imu_yaw_rate: false}}", "expert stands outside"},
       {"[1, 2]", "must be a map"},

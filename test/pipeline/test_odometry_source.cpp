@@ -118,6 +118,23 @@ TEST(OdometrySource, RoundedPosesAndJitteringStampsAreHealthy) {
   EXPECT_TRUE(result.warnings.empty()) << result.warnings[0];
 }
 
+// A skidding robot (a Husky) on a gentle way: its yaw rate is off by 0.1 rad/s now and then, and as far round as its pose.
+TEST(OdometrySource, AYawRateThatIsNoisyButTurnsAsFarAsThePoseIsHealthy) {
+  RandomEngine engine = make_engine(5);
+  OdometryDrive drive{10.0};
+  drive.motion = [](double time_s) { return Twist2{1.0, 0.06 * std::sin(0.3 * time_s)}; };
+  double noise_radps = 0.0;
+  int last_block = -1;
+  const Result result = run(drive, [&](OdometrySample& told, double time_s) {
+    const int block = static_cast<int>(time_s / 0.5);
+    if (block != last_block) noise_radps = 0.1 * draw_normal(engine);
+    last_block = block;
+    told.twist.yaw_rate_radps += noise_radps;
+  });
+  EXPECT_TRUE(result.warnings.empty()) << result.warnings[0];
+  EXPECT_EQ(result.complained_s, 0.0);
+}
+
 struct Mistake {
   const char* name;
   Change change;

@@ -38,6 +38,13 @@ TEST(StatusLine, WithoutAnEstimate) {
   EXPECT_EQ(status_line(report), "WARN: waiting for odometry; 0 of 0 fixes used");
 }
 
+TEST(StatusLine, WhileItWaitsWithFixesItDoesNotSayThatThereAreNone) {
+  LocalizationReport report;
+  report.reason = "waiting for the datum";
+  report.last_fix.stamp = from_seconds(12.0);
+  EXPECT_EQ(status_line(report), "WARN: waiting for the datum; fixes come, none was examined yet");
+}
+
 TEST(StatusLine, AGateThatFindsNothingIsAWarning) {
   LocalizationReport report = tracking_report();
   report.is_gate_inert = true;

@@ -52,6 +52,11 @@ class LaunchFilesTest(unittest.TestCase):
         robots = [os.path.basename(each)[:-5] for each in glob.glob(os.path.join(ROOT, "config", "robots", "*.yaml"))]
         self.assertEqual(sorted(choices.group(1).split(", ")), sorted(robots))
 
+    def test_a_localizer_of_the_comparison_that_is_none_is_named(self):
+        path = os.path.join(ROOT, "launch", "comparison.launch")
+        self.assertIn("config/imm: no such localizer, but", roslaunch("--dump-params", path, "localizers:=imm ukf"))
+        self.assertNotIn("no such", roslaunch("--dump-params", path, "localizers:=imm_ekf ukf"))
+
     def test_parameters_of_the_launch_before_are_cleared(self):
         """A file of parameters that was corrected is launched again on the same roscore: what was wrong is gone."""
         ours = 0

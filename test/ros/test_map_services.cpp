@@ -66,5 +66,26 @@ TEST(MapServices, WhatIsNoPlaceIsRefusedByName) {
   EXPECT_THAT(answer(high, kMap).message, HasSubstr("not near the ground: altitude"));
 }
 
+// A goal in another country is a mistake, and mostly one of these.
+TEST(MapServices, APlaceThatIsFarFromTheDatumIsRefusedWithAHint) {
+  const auto ask = [](double latitude, double longitude) {
+    FromLL::Request request;
+    request.latitude = latitude;
+    request.longitude = longitude;
+    return answer(request, kMap);
+  };
+  EXPECT_THAT(ask(11.5755, 48.1374).message, HasSubstr("km from the datum: must be within 1000 km; latitude and "
+                                                       "longitude swapped?"));
+  EXPECT_THAT(ask(-48.1374, 11.5755).message, HasSubstr("the sign of the latitude"));
+  EXPECT_THAT(ask(22.3, 114.2).message, HasSubstr("must be within 1000 km"));
+  EXPECT_FALSE(ask(22.3, 114.2).success);
+  EXPECT_TRUE(ask(52.5, 13.4).success) << "500 km";
+  FromLLArray::Request two;
+  two.latitudes = {48.14, 11.5755};
+  two.longitudes = {11.58, 48.1374};
+  EXPECT_THAT(answer(two, kMap).message, HasSubstr("element 1: the place is"));
+  EXPECT_TRUE(answer(two, kMap).map_points.empty());
+}
+
 }  // namespace
 }  // namespace urban_gnss

@@ -85,7 +85,7 @@ class NodesTest(unittest.TestCase):
             for fault in ("bad.yaml:1: receiver.rate = 99", "start (0, 0) is inside bank",
                           "bad.yaml:4: route.sped: no such parameter; did you mean speed?"):
                 self.assertIn(fault, output)
-            self.assertIn("absent.yaml: cannot be read", refuse("_scenario:=" + os.path.join(directory, "absent.yaml")))
+            self.assertIn("absent.yaml: no such file", refuse("_scenario:=" + os.path.join(directory, "absent.yaml")))
         self.assertIn("scenario: a city needs the file of a scenario", refuse())
         self.assertIn("did you mean follow_route?", refuse("_scenario:=x", "_follow_rout:=true"))
 

@@ -64,6 +64,7 @@ class TwistCheck {
     double pose_square{0.0}, twist_square{0.0}, fixed_square{0.0};
     Vector pose_twist, pose_fixed;  ///< products with the conjugate of the twist
     double by_pose{0.0}, by_twist{0.0}, turned{0.0};
+    Vector off;  ///< sum of the pose's steps less those of the twist
   };
   /// What windows have shown of the speed, or of the yaw rate.
   struct Verdict {
