@@ -22,7 +22,8 @@ std::array<MotionStep, kQualityLevels> make_motion_steps(
     const Twist2& twist, double duration_s, const MotionParameters& motion,
     const std::array<OdometryErrorParameters, kQualityLevels>& levels) {
   std::array<MotionStep, kQualityLevels> steps;
-  for (std::size_t i = 0; i < kQualityLevels; ++i) steps[i] = make_motion_step(twist, duration_s, motion, levels[i]);
+  steps.fill(make_motion_step(twist, duration_s, motion));
+  for (std::size_t i = 0; i < kQualityLevels; ++i) scale_noise(steps[i], levels[i]);
   return steps;
 }
 

@@ -2,22 +2,10 @@
 
 #include <Eigen/Dense>
 
-#include "urban_gnss_localization/common/random.hpp"
-#include "urban_gnss_localization/localizers/switching/bias_ekf.hpp"
+#include "random_gaussian.hpp"
 
 namespace urban_gnss {
 namespace {
-
-BiasGaussian random_gaussian(RandomEngine& engine) {
-  BiasGaussian state;
-  BiasEkfCovariance root;
-  for (int i = 0; i < kBiasStates; ++i) {
-    state.mean[i] = 0.3 * draw_normal(engine);
-    for (int j = 0; j < kBiasStates; ++j) root(i, j) = draw_normal(engine);
-  }
-  state.covariance = root * root.transpose();
-  return state;
-}
 
 /// F P F' + Q with the whole matrices.
 BiasEkfCovariance predicted_covariance(const BiasGaussian& state, const MotionStep& motion,

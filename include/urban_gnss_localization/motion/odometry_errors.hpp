@@ -35,6 +35,8 @@ struct OdometryErrorParameters {
   }
 };
 
+/// Leaves the noise that is not the errors'.
+void scale_noise(MotionStep& step, const OdometryErrorParameters& errors);
 /// The motion model's step with the noise that is left where the odometry's errors are states.
 MotionStep make_motion_step(const Twist2& twist, double duration_s, const MotionParameters& motion,
                             const OdometryErrorParameters& errors);

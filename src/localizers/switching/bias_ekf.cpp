@@ -59,21 +59,17 @@ void doubt(BiasGaussian& state, const MotionDoubt& doubt) {
   state.covariance(kYaw, kYaw) += doubt.heading_rad2;
 }
 
-void continue_bias(BiasGaussian& state, BiasMode from, BiasMode to, double elapsed_s, const BiasModeParameters& p) {
+BiasStep bias_step(BiasMode from, BiasMode to, double elapsed_s, const BiasModeParameters& p) {
   const bool goes_on = from != BiasMode::kDirect && (to == BiasMode::kSlow || to == BiasMode::kFast);
-  if (goes_on) {
-    const double fade = bias_fade(elapsed_s, p);
-    state.mean.tail<2>() *= fade;
-    state.covariance.rightCols<2>() *= fade;
-    state.covariance.bottomRows<2>() *= fade;
-    state.covariance.diagonal().tail<2>().array() += bias_growth(to, elapsed_s, p);
-  } else {
-    const BiasState begun = predict_bias({}, from, to, elapsed_s, p);
-    state.mean.tail<2>() = begun.mean;
-    state.covariance.rightCols<2>().setZero();
-    state.covariance.bottomRows<2>().setZero();
-    state.covariance.diagonal().tail<2>().setConstant(begun.variance);
-  }
+  if (goes_on) return {bias_fade(elapsed_s, p), bias_growth(to, elapsed_s, p)};
+  return {0.0, predict_bias({}, from, to, elapsed_s, p).variance};
+}
+
+void continue_bias(BiasGaussian& state, const BiasStep& step) {
+  state.mean.tail<2>() *= step.left;
+  state.covariance.rightCols<2>() *= step.left;
+  state.covariance.bottomRows<2>() *= step.left;
+  state.covariance.diagonal().tail<2>().array() += step.growth_m2;
 }
 
 BiasEkfUpdate take_fix(BiasGaussian& state, BiasMode mode, const FixMeasurement& fix, const FixNoise& noise,

@@ -134,7 +134,7 @@ bool SwitchingParticleFilter::continue_all(const FixMeasurement& fix, Opinion& o
   for (const BiasHypothesis& before : hypotheses_) {
     for (const BiasMode to : kModes) {
       BiasGaussian state = before.state;
-      continue_bias(state, before.mode, to, elapsed_s, parameters_.model.modes);
+      continue_bias(state, bias_step(before.mode, to, elapsed_s, parameters_.model.modes));
       const double weight =
           before.weight * transition(static_cast<int>(index_of(before.mode)), static_cast<int>(index_of(to)));
       for (std::size_t level = 0; level < kQualityLevels; ++level) {

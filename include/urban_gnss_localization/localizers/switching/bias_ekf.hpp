@@ -121,10 +121,15 @@ void predict(BiasGaussian& state, const MotionStep& step, const OdometryErrorPar
 /// Adds what the last step may be wrong by.
 void doubt(BiasGaussian& state, const MotionDoubt& doubt);
 
-/// The bias goes on from the last fix, in the lasting mode `from`, to one `elapsed_s` >= 0 later in mode `to`:
-/// predict_bias() within the state.
-void continue_bias(BiasGaussian& state, BiasMode from, BiasMode to, double elapsed_s,
-                   const BiasModeParameters& parameters);
+/// How a bias goes on from the last fix to the next.
+struct BiasStep {
+  double left{0.0};       ///< share of it that is left
+  double growth_m2{0.0};  ///< variance per axis that comes to it
+};
+/// predict_bias() from the lasting mode `from` to a fix `elapsed_s` >= 0 later in mode `to`.
+BiasStep bias_step(BiasMode from, BiasMode to, double elapsed_s, const BiasModeParameters& parameters);
+/// The same within the state.
+void continue_bias(BiasGaussian& state, const BiasStep& step);
 
 /// What a measurement said.
 struct BiasEkfUpdate {

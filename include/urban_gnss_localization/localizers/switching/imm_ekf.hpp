@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <array>
 
+#include "urban_gnss_localization/localizers/switching/bias_quad.hpp"
 #include "urban_gnss_localization/localizers/switching/fix_statistics.hpp"
 
 namespace urban_gnss {
@@ -53,17 +54,17 @@ class ImmEkf : public Localizer {
   Gaussian mixture() const;
 
  private:
-  static constexpr std::size_t kFilters = kQualityLevels * kLastingModes;
-  static constexpr std::size_t kBranches = kQualityLevels * kContinuations;
   /// The filters of all modes that a fix may have at each quality, each with the fix taken.
   struct Branches {
-    std::array<Gaussian, kBranches> filters;
-    std::array<BiasEkfUpdate, kBranches> updates;
-    std::array<double, kBranches> probability{};  ///< posterior
-    QualityProbabilities expected_quality;        ///< before the fix
+    BiasQuads filters;
+    std::array<BiasQuadUpdate, kQualityLevels> updates;
+    QualityNumbers probability{};           ///< posterior
+    QualityProbabilities expected_quality;  ///< before the fix
     bool are_finite{false};
   };
   Branches branch(const FixMeasurement& fix) const;
+  /// Of each mode, the weights of the qualities from which one comes to `to`, and how probable that is.
+  QualityNumbers mixed_qualities(const QualityTransition& quality, std::size_t to, ModeNumbers& before) const;
   /// Weighs the filters of each quality so that they sum to `target`.
   void set_quality(const QualityProbabilities& target);
   /// Goes on with the filters of the branches, those of slow bias and of a jump as one.
@@ -74,8 +75,8 @@ class ImmEkf : public Localizer {
   double nis_threshold_;
   FixStatistics statistics_;
   std::array<OdometryErrorParameters, kQualityLevels> levels_;
-  std::array<Gaussian, kFilters> filters_;
-  std::array<double, kFilters> probability_{};
+  BiasQuads filters_;
+  QualityNumbers probability_{};  ///< 0 of the idle filters
 };
 
 }  // namespace urban_gnss
