@@ -1,22 +1,37 @@
 #include "urban_gnss_localization/gnss/range_geometry.hpp"
 
-#include <map>
+#include <algorithm>
 
 namespace urban_gnss {
 
-Eigen::MatrixXd range_geometry(const std::vector<RangeDirection>& ranges) {
-  std::map<Constellation, Eigen::Index> clocks;
-  for (const RangeDirection& each : ranges) {
-    clocks.emplace(each.clock, kFirstClockColumn + static_cast<Eigen::Index>(clocks.size()));
+std::size_t clock_number(Constellation constellation) {
+  return std::min(static_cast<std::size_t>(clock_of(constellation)), kMostClocks - 1);
+}
+
+void ClockMeans::add(std::size_t clock, double weight, double residual_m, const Eigen::Vector3d& line_of_sight) {
+  Mean& mean = means_[clock];
+  mean.weight += weight;
+  mean.residual_m += weight * residual_m;
+  mean.line_of_sight += weight * line_of_sight;
+}
+
+void ClockMeans::finish() {
+  for (Mean& mean : means_) {
+    if (!(mean.weight > 0.0)) continue;
+    mean.residual_m /= mean.weight;
+    mean.line_of_sight /= mean.weight;
   }
-  const Eigen::Index unknowns = kFirstClockColumn + static_cast<Eigen::Index>(clocks.size());
-  Eigen::MatrixXd geometry = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(ranges.size()), unknowns);
-  for (Eigen::Index i = 0; i < geometry.rows(); ++i) {
-    const RangeDirection& each = ranges[static_cast<std::size_t>(i)];
-    geometry.row(i).head<3>() = -each.line_of_sight;
-    geometry(i, clocks.at(each.clock)) = 1.0;
-  }
-  return geometry;
+}
+
+std::size_t ClockMeans::count() const {
+  return static_cast<std::size_t>(
+      std::count_if(means_.begin(), means_.end(), [](const Mean& mean) { return mean.weight > 0.0; }));
+}
+
+double ClockMeans::explained_m2() const {
+  double sum = 0.0;
+  for (const Mean& mean : means_) sum += mean.weight * mean.residual_m * mean.residual_m;
+  return sum;
 }
 
 }  // namespace urban_gnss

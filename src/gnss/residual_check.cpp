@@ -12,57 +12,75 @@ namespace {
 
 constexpr std::size_t kEpochs = 60;
 constexpr std::size_t kLeastEpochs = 20;
-constexpr Eigen::Index kLeastSpare = 2;
+constexpr std::size_t kLeastSpare = 2;
 constexpr double kBelievedAgain = 2.0 / 3.0;
 constexpr double kLeastSine = 0.05;  ///< of an elevation, for the weights
 constexpr double kCn0Unknown_dbhz = 35.0;
 constexpr double kCn0Min_dbhz = 15.0;
 constexpr double kCn0Max_dbhz = 55.0;
 
-/// Share of the weighted residuals that the columns of the geometry explain; nothing where there are no residuals.
-std::optional<double> explained_share(const Eigen::MatrixXd& geometry, const Eigen::VectorXd& residuals_m,
-                                      const Eigen::VectorXd& weights) {
-  const Eigen::VectorXd root = weights.cwiseSqrt();
-  const Eigen::VectorXd weighted = root.asDiagonal() * residuals_m;
-  const double all = weighted.squaredNorm();
+struct UsedRange {
+  std::size_t clock;
+  Eigen::Vector3d line_of_sight;
+  double residual_m;
+  double by_elevation;  ///< weights
+  double by_cn0;
+};
+
+/// Share of the weighted residuals that place and clocks explain; nothing where there are no residuals.
+template <class WeightOf>
+std::optional<double> explained_share(const std::vector<UsedRange>& ranges, const WeightOf& weight_of) {
+  ClockMeans clocks;
+  double all = 0.0;
+  for (const UsedRange& range : ranges) {
+    const double weight = weight_of(range);
+    all += weight * range.residual_m * range.residual_m;
+    clocks.add(range.clock, weight, range.residual_m, range.line_of_sight);
+  }
   if (!(all > 0.0) || !std::isfinite(all)) return std::nullopt;
-  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> factors(root.asDiagonal() * geometry);
-  const Eigen::VectorXd turned = factors.householderQ().transpose() * weighted;
-  return turned.head(factors.rank()).squaredNorm() / all;
+  clocks.finish();
+  using Columns = Eigen::Matrix<double, Eigen::Dynamic, 3>;
+  Columns geometry(ranges.size(), 3);
+  Eigen::VectorXd left(ranges.size());
+  for (Eigen::Index i = 0; i < left.size(); ++i) {
+    const UsedRange& range = ranges[static_cast<std::size_t>(i)];
+    const ClockMeans::Mean& clock = clocks.of(range.clock);
+    const double root = std::sqrt(weight_of(range));
+    geometry.row(i) = root * (range.line_of_sight - clock.line_of_sight).transpose();
+    left[i] = root * (range.residual_m - clock.residual_m);
+  }
+  const Eigen::ColPivHouseholderQR<Columns> factors(geometry);
+  left.applyOnTheLeft(factors.householderQ().adjoint());
+  return (clocks.explained_m2() + left.head(factors.rank()).squaredNorm()) / all;
 }
 
 }  // namespace
 
 std::optional<double> residual_misfit(const std::vector<SatelliteObservation>& satellites) {
-  std::vector<RangeDirection> ranges;
-  std::vector<const SatelliteObservation*> used;
+  std::vector<UsedRange> ranges;
+  ranges.reserve(satellites.size());
+  ClockMeans clocks;
   for (const SatelliteObservation& each : satellites) {
     if (!has_direction(each) || !each.tracked || !std::isfinite(each.residual_m)) continue;
-    ranges.push_back({clock_of(each.id.constellation), line_of_sight(each.look)});
-    used.push_back(&each);
-  }
-  const Eigen::MatrixXd geometry = range_geometry(ranges);
-  if (geometry.rows() < geometry.cols() + kLeastSpare) return std::nullopt;
-
-  Eigen::VectorXd residuals_m(geometry.rows());
-  Eigen::VectorXd by_elevation(geometry.rows());
-  Eigen::VectorXd by_cn0(geometry.rows());
-  for (Eigen::Index i = 0; i < geometry.rows(); ++i) {
-    const SatelliteObservation& each = *used[static_cast<std::size_t>(i)];
-    residuals_m[i] = each.residual_m;
-    by_elevation[i] = std::pow(std::max(std::sin(each.look.elevation_rad), kLeastSine), 2);
     const double cn0_dbhz = has_cn0(each) ? each.cn0_dbhz : kCn0Unknown_dbhz;
-    by_cn0[i] = std::pow(10.0, (std::clamp(cn0_dbhz, kCn0Min_dbhz, kCn0Max_dbhz) - kCn0Unknown_dbhz) / 10.0);
+    ranges.push_back({clock_number(each.id.constellation), line_of_sight(each.look), each.residual_m,
+                      std::pow(std::max(std::sin(each.look.elevation_rad), kLeastSine), 2),
+                      std::pow(10.0, (std::clamp(cn0_dbhz, kCn0Min_dbhz, kCn0Max_dbhz) - kCn0Unknown_dbhz) / 10.0)});
+    clocks.add(ranges.back().clock, 1.0, each.residual_m, ranges.back().line_of_sight);
   }
-  const Eigen::VectorXd equal = Eigen::VectorXd::Ones(geometry.rows());
+  const std::size_t unknowns = 3 + clocks.count();
+  if (ranges.size() < unknowns + kLeastSpare) return std::nullopt;
   std::optional<double> least;
-  for (const Eigen::VectorXd& weights :
-       {equal, by_elevation, by_cn0, Eigen::VectorXd(by_elevation.cwiseProduct(by_cn0))}) {
-    const auto share = explained_share(geometry, residuals_m, weights);
+  const auto try_weights = [&](const auto& weight_of) {
+    const auto share = explained_share(ranges, weight_of);
     if (share) least = std::min(least.value_or(*share), *share);
-  }
+  };
+  try_weights([](const UsedRange&) { return 1.0; });
+  try_weights([](const UsedRange& range) { return range.by_elevation; });
+  try_weights([](const UsedRange& range) { return range.by_cn0; });
+  try_weights([](const UsedRange& range) { return range.by_elevation * range.by_cn0; });
   if (!least) return std::nullopt;
-  return *least * static_cast<double>(geometry.rows()) / static_cast<double>(geometry.cols());
+  return *least * static_cast<double>(ranges.size()) / static_cast<double>(unknowns);
 }
 
 void ResidualCheck::add(const std::vector<SatelliteObservation>& satellites) {

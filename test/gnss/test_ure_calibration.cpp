@@ -7,7 +7,6 @@
 #include "urban_gnss_localization/common/random.hpp"
 #include "urban_gnss_localization/gnss/cn0_curve.hpp"
 #include "urban_gnss_localization/gnss/dilution_of_precision.hpp"
-#include "urban_gnss_localization/gnss/range_geometry.hpp"
 #include "urban_gnss_localization/gnss/stationary_part.hpp"
 #include "urban_gnss_localization/gnss/ure_calibration.hpp"
 
@@ -18,9 +17,11 @@ namespace {
 std::vector<StationaryFix> recording(double sigma_m, int count, double lasting_s, double interval_s, std::uint64_t seed,
                                      bool with_residuals = true) {
   RandomEngine engine = make_engine(seed);
-  std::vector<RangeDirection> ranges;
-  for (const SatelliteObservation& each : open_sky()) ranges.push_back({Constellation::kGps, line_of_sight(each.look)});
-  const Eigen::MatrixXd h = range_geometry(ranges);
+  const auto sky = open_sky();
+  Eigen::MatrixXd h = Eigen::MatrixXd::Ones(static_cast<Eigen::Index>(sky.size()), 4);  // place and clock
+  for (std::size_t i = 0; i < sky.size(); ++i) {
+    h.row(static_cast<Eigen::Index>(i)).head<3>() = -line_of_sight(sky[i].look);
+  }
   Eigen::VectorXd errors(h.rows());
   for (Eigen::Index i = 0; i < errors.size(); ++i) errors[i] = sigma_m * draw_normal(engine);
   const double kept = lasting_s > 0.0 ? std::exp(-interval_s / lasting_s) : 0.0;

@@ -72,9 +72,13 @@ std::optional<RelativePlace> FixStatistics::place_by_ranges(const FixMeasurement
 FixMeasurement FixStatistics::effective_fix(const FixMeasurement& fix, const BiasGaussian& before) {
   const auto place = place_by_ranges(fix, before);
   of_ranges_ = place.has_value();
-  FixMeasurement effective = fix;
+  FixMeasurement effective;  // without its satellites, which have had their say
+  effective.position = fix.position;
   if (place) effective.position += place->offset;
   effective.covariance = place ? place->covariance : noise_.effective_covariance(fix.covariance);
+  effective.antenna_in_body = fix.antenna_in_body;
+  effective.time_s = fix.time_s;
+  effective.stamp = fix.stamp;
   return effective;
 }
 
