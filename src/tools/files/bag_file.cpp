@@ -58,18 +58,18 @@ class Bytes {
 /// The fields NAME=VALUE of a record.
 class Fields {
  public:
-  explicit Fields(std::string_view header) {
+  explicit Fields(std::string_view header) : header_(header) {
     for (Bytes rest(header); !rest.empty();) {
-      const std::string_view field = rest.sized();
-      const auto equal = field.find('=');
-      if (equal == std::string_view::npos) throw Damage("a field has no name");
-      fields_.emplace_back(field.substr(0, equal), field.substr(equal + 1));
+      if (rest.sized().find('=') == std::string_view::npos) throw Damage("a field has no name");
     }
   }
   /// Empty where there is none.
   std::string_view text(std::string_view name) const {
-    for (const auto& [known, value] : fields_) {
-      if (known == name) return value;
+    for (Bytes rest(header_); !rest.empty();) {
+      const std::string_view field = rest.sized();
+      if (field.size() > name.size() && field[name.size()] == '=' && field.substr(0, name.size()) == name) {
+        return field.substr(name.size() + 1);
+      }
     }
     return {};
   }
@@ -90,7 +90,7 @@ class Fields {
   }
 
  private:
-  std::vector<std::pair<std::string_view, std::string_view>> fields_;
+  std::string_view header_;
 };
 
 }  // namespace
@@ -148,13 +148,18 @@ void BagFile::fail_as_damaged(const std::string& what) const {
 }
 
 std::vector<std::uint8_t> BagFile::read_bytes(std::uint64_t position, std::uint64_t size) {
+  std::vector<std::uint8_t> bytes;
+  read_bytes(position, size, bytes);
+  return bytes;
+}
+
+void BagFile::read_bytes(std::uint64_t position, std::uint64_t size, std::vector<std::uint8_t>& bytes) {
   if (position > size_ || size > size_ - position) throw Damage("a record ends after the file");
-  std::vector<std::uint8_t> bytes(size);
+  bytes.resize(size);
   file_.clear();
   file_.seekg(static_cast<std::streamoff>(position));
   file_.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(size));
   if (!file_) throw Damage("it cannot be read");
-  return bytes;
 }
 
 BagFile::Record BagFile::read_record(std::uint64_t position, bool with_data) {
@@ -219,25 +224,37 @@ void BagFile::add_chunk(const Record& record, std::uint64_t end) {
   chunks_.push_back(std::move(chunk));
 }
 
-std::vector<std::uint8_t> BagFile::decompress(const Record& record) const {
+std::shared_ptr<std::vector<std::uint8_t>> BagFile::free_buffer() {
+  for (const auto& buffer : buffers_) {
+    if (buffer.use_count() == 1) return buffer;
+  }
+  buffers_.push_back(std::make_shared<std::vector<std::uint8_t>>());
+  return buffers_.back();
+}
+
+std::shared_ptr<const std::vector<std::uint8_t>> BagFile::read_chunk(std::uint64_t position) {
+  const Record record = read_record(position, false);
   const Fields fields = record.fields();
   fields.require_op(rosbag::OP_CHUNK, "a chunk");
   const std::string_view kind = fields.text("compression");
   const auto size = fields.number<std::uint32_t>("size");
+  const auto bytes = free_buffer();
   if (kind == rosbag::COMPRESSION_NONE) {
-    if (size != record.data.size()) throw Damage("a chunk has another size than it says");
-    return record.data;
+    if (size != record.data_size) throw Damage("a chunk has another size than it says");
+    read_bytes(record.data_position, size, *bytes);
+    return bytes;
   }
   if (kind != rosbag::COMPRESSION_BZ2 && kind != rosbag::COMPRESSION_LZ4) {
     throw Damage("a chunk is compressed in an unknown way");
   }
   if (size > kLongestChunk) throw Damage("a chunk is too long");
-  std::vector<std::uint8_t> bytes(size);
+  read_bytes(record.data_position, record.data_size, compressed_);
+  bytes->resize(size);
   if (size == 0) return bytes;
   try {
     rosbag::ChunkedFile().decompress(
-        kind == rosbag::COMPRESSION_BZ2 ? rosbag::compression::BZ2 : rosbag::compression::LZ4, bytes.data(), size,
-        const_cast<std::uint8_t*>(record.data.data()), static_cast<unsigned>(record.data.size()));
+        kind == rosbag::COMPRESSION_BZ2 ? rosbag::compression::BZ2 : rosbag::compression::LZ4, bytes->data(), size,
+        compressed_.data(), static_cast<unsigned>(compressed_.size()));
   } catch (const rosbag::BagException& error) {
     throw Damage(error.what());
   }
@@ -245,23 +262,33 @@ std::vector<std::uint8_t> BagFile::decompress(const Record& record) const {
 }
 
 std::vector<BagMessage> BagFile::read(const Chunk& chunk, const std::set<ConnectionId>& wanted) {
+  struct Found {
+    const std::shared_ptr<const BagConnection>* connection;
+    bool is_wanted;
+    std::uint32_t count{0};
+  };
   std::vector<BagMessage> messages;
   try {
-    const std::vector<std::uint8_t> bytes = decompress(read_record(chunk.position, true));
-    std::map<ConnectionId, std::uint32_t> counts;
-    for (Bytes rest(bytes.data(), bytes.size()); !rest.empty();) {
+    const auto bytes = read_chunk(chunk.position);
+    std::map<ConnectionId, Found> all;
+    for (Bytes rest(bytes->data(), bytes->size()); !rest.empty();) {
       const Fields fields(rest.sized());
       const std::string_view data = rest.sized();
       if (fields.op() == rosbag::OP_CONNECTION) continue;
       fields.require_op(rosbag::OP_MSG_DATA, "a message");
       const auto id = fields.number<ConnectionId>("conn");
-      const auto connection = connections_.find(id);
-      if (connection == connections_.end()) throw Damage("a message has a connection that is not known");
-      ++counts[id];
-      if (wanted.count(id) == 0) continue;
-      messages.emplace_back(connection->second, fields.time("time"),
-                            std::vector<std::uint8_t>(data.begin(), data.end()));
+      auto found = all.find(id);
+      if (found == all.end()) {
+        const auto connection = connections_.find(id);
+        if (connection == connections_.end()) throw Damage("a message has a connection that is not known");
+        found = all.emplace(id, Found{&connection->second, wanted.count(id) > 0}).first;
+      }
+      ++found->second.count;
+      if (!found->second.is_wanted) continue;
+      messages.emplace_back(*found->second.connection, fields.time("time"), bytes, data);
     }
+    std::map<ConnectionId, std::uint32_t> counts;
+    for (const auto& [id, found] : all) counts[id] = found.count;
     if (counts != chunk.counts) throw Damage("a chunk has other messages than the index says");
   } catch (const Damage& damage) {
     fail_as_damaged(damage.what());

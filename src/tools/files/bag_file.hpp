@@ -39,7 +39,8 @@ class BagFile {
   const std::map<ConnectionId, std::shared_ptr<const BagConnection>>& connections() const { return connections_; }
   const std::vector<Chunk>& chunks() const { return chunks_; }
 
-  /// The messages of the wanted connections, as they lie in the chunk. Throws BagError where it is damaged.
+  /// The messages of the wanted connections, as they lie in the chunk, whose bytes they share. Throws BagError where it
+  /// is damaged.
   std::vector<BagMessage> read(const Chunk& chunk, const std::set<ConnectionId>& wanted);
 
  private:
@@ -51,7 +52,11 @@ class BagFile {
   void add_chunk(const Record& record, std::uint64_t end);
   Record read_record(std::uint64_t position, bool with_data);
   std::vector<std::uint8_t> read_bytes(std::uint64_t position, std::uint64_t size);
-  std::vector<std::uint8_t> decompress(const Record& record) const;
+  void read_bytes(std::uint64_t position, std::uint64_t size, std::vector<std::uint8_t>& bytes);
+  /// What a chunk holds, decompressed.
+  std::shared_ptr<const std::vector<std::uint8_t>> read_chunk(std::uint64_t position);
+  /// One that no message shares any more, or a new one.
+  std::shared_ptr<std::vector<std::uint8_t>> free_buffer();
   [[noreturn]] void fail_as_damaged(const std::string& what) const;
 
   std::string path_;
@@ -59,6 +64,8 @@ class BagFile {
   std::uint64_t size_{0};
   std::map<ConnectionId, std::shared_ptr<const BagConnection>> connections_;
   std::vector<Chunk> chunks_;
+  std::vector<std::shared_ptr<std::vector<std::uint8_t>>> buffers_;  ///< of chunks, used again and again
+  std::vector<std::uint8_t> compressed_;
 };
 
 }  // namespace urban_gnss

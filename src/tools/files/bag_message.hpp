@@ -10,6 +10,7 @@
 #include <memory>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <type_traits>
 #include <vector>
 
@@ -61,11 +62,12 @@ class CheckedStream {
 /// A message of a bag, with the names that rosbag::MessageInstance has.
 class BagMessage {
  public:
-  BagMessage(std::shared_ptr<const BagConnection> connection, Stamp time, std::vector<std::uint8_t> bytes)
-      : connection_(std::move(connection)),
-        time_(time),
-        bytes_(std::make_shared<const std::vector<std::uint8_t>>(std::move(bytes))) {}
+  /// `bytes` lie in the chunk.
+  BagMessage(std::shared_ptr<const BagConnection> connection, Stamp time,
+             std::shared_ptr<const std::vector<std::uint8_t>> chunk, std::string_view bytes)
+      : connection_(std::move(connection)), time_(time), chunk_(std::move(chunk)), bytes_(bytes) {}
 
+  const BagConnection& connection() const { return *connection_; }
   /// The file that it is in.
   const std::string& bag() const { return connection_->bag; }
   /// When it was recorded.
@@ -74,11 +76,11 @@ class BagMessage {
   const std::string& getDataType() const { return connection_->type; }
   const std::string& getMD5Sum() const { return connection_->md5sum; }
   const std::string& getMessageDefinition() const { return connection_->definition; }
-  std::uint32_t size() const { return static_cast<std::uint32_t>(bytes_->size()); }
+  std::uint32_t size() const { return static_cast<std::uint32_t>(bytes_.size()); }
 
   template <class Stream>
   void write(Stream& stream) const {
-    if (!bytes_->empty()) std::memcpy(stream.advance(size()), bytes_->data(), bytes_->size());
+    if (!bytes_.empty()) std::memcpy(stream.advance(size()), bytes_.data(), bytes_.size());
   }
 
   /// The message as an M; null where it is of another type. Throws std::runtime_error that names the topic where it is
@@ -87,16 +89,17 @@ class BagMessage {
   boost::shared_ptr<M> instantiate() const {
     namespace traits = ros::message_traits;
     if (getDataType() != traits::DataType<M>::value()) return nullptr;
-    const std::string where = bag() + ": " + getTopic() + ": ";
+    const auto where = [this] { return bag() + ": " + getTopic() + ": "; };
     if (getMD5Sum() != traits::MD5Sum<M>::value()) {
-      throw std::runtime_error(where + "its " + getDataType() + " is of another version, or the bag is damaged");
+      throw std::runtime_error(where() + "its " + getDataType() + " is of another version, or the bag is damaged");
     }
     auto message = boost::make_shared<M>();
     try {
-      CheckedStream stream(bytes_->data(), bytes_->data() + bytes_->size());
+      const auto* const begin = reinterpret_cast<const std::uint8_t*>(bytes_.data());
+      CheckedStream stream(begin, begin + bytes_.size());
       stream.next(*message);
     } catch (const ros::serialization::StreamOverrunException&) {
-      throw std::runtime_error(where + "a " + getDataType() + " is damaged: it is shorter than it says");
+      throw std::runtime_error(where() + "a " + getDataType() + " is damaged: it is shorter than it says");
     }
     return message;
   }
@@ -104,7 +107,8 @@ class BagMessage {
  private:
   std::shared_ptr<const BagConnection> connection_;
   Stamp time_;
-  std::shared_ptr<const std::vector<std::uint8_t>> bytes_;
+  std::shared_ptr<const std::vector<std::uint8_t>> chunk_;  ///< that holds the bytes
+  std::string_view bytes_;
 };
 
 inline std::runtime_error wrong_type(const BagMessage& message, const std::string& expected) {

@@ -1,6 +1,7 @@
 #include "bag_reader.hpp"
 
 #include <algorithm>
+#include <map>
 #include <set>
 #include <tuple>
 #include <utility>
@@ -74,35 +75,50 @@ Stamp BagMessages::last_time() const {
   return last;
 }
 
-bool BagMessages::IsLater::operator()(const Placed& a, const Placed& b) const {
-  const auto key = [](const Placed& each) { return std::make_tuple(each.message.time(), each.rank, each.number); };
-  return key(a) > key(b);
-}
-
 void BagMessages::load(const PlacedChunk& placed) {
   std::set<BagFile::ConnectionId> wanted;
+  std::map<const BagConnection*, std::size_t> ranks;
   for (const auto& [id, connection] : placed.file->connections()) {
-    if (rank_of(connection->topic) < names_.size()) wanted.insert(id);
+    const std::size_t rank = rank_of(connection->topic);
+    if (rank >= names_.size()) continue;
+    wanted.insert(id);
+    ranks[connection.get()] = rank;
   }
-  for (BagMessage& message : placed.file->read(*placed.chunk, wanted)) {
-    const std::size_t rank = rank_of(message.getTopic());
-    messages_.push({rank, loaded_++, std::move(message)});
+  Loaded loaded;
+  std::vector<BagMessage> messages = placed.file->read(*placed.chunk, wanted);
+  loaded.messages.reserve(messages.size());
+  for (BagMessage& message : messages) {
+    const std::size_t rank = ranks.at(&message.connection());
+    loaded.messages.push_back({rank, loaded_++, std::move(message)});
   }
+  if (loaded.messages.empty()) return;
+  const auto is_earlier = [](const Placed& a, const Placed& b) { return a.key() < b.key(); };
+  if (!std::is_sorted(loaded.messages.begin(), loaded.messages.end(), is_earlier)) {
+    std::sort(loaded.messages.begin(), loaded.messages.end(), is_earlier);
+  }
+  chunks_at_hand_.push_back(std::move(loaded));
+  std::push_heap(chunks_at_hand_.begin(), chunks_at_hand_.end(), IsLater());
 }
 
 const BagMessage* BagMessages::peek() {
   while (next_chunk_ < chunks_.size() &&
-         (messages_.empty() || chunks_[next_chunk_].chunk->first <= messages_.top().message.time())) {
+         (chunks_at_hand_.empty() ||
+          chunks_[next_chunk_].chunk->first <= chunks_at_hand_.front().front().message.time())) {
     load(chunks_[next_chunk_++]);
   }
-  return messages_.empty() ? nullptr : &messages_.top().message;
+  return chunks_at_hand_.empty() ? nullptr : &chunks_at_hand_.front().front().message;
 }
 
 std::optional<BagMessage> BagMessages::next() {
-  const BagMessage* const first = peek();
-  if (first == nullptr) return std::nullopt;
-  BagMessage message = *first;
-  messages_.pop();
+  if (peek() == nullptr) return std::nullopt;
+  std::pop_heap(chunks_at_hand_.begin(), chunks_at_hand_.end(), IsLater());
+  Loaded& chunk = chunks_at_hand_.back();
+  std::optional<BagMessage> message(std::move(chunk.messages[chunk.next++].message));
+  if (chunk.next == chunk.messages.size()) {
+    chunks_at_hand_.pop_back();
+  } else {
+    std::push_heap(chunks_at_hand_.begin(), chunks_at_hand_.end(), IsLater());
+  }
   return message;
 }
 

@@ -3,8 +3,8 @@
 #include <cstddef>
 #include <memory>
 #include <optional>
-#include <queue>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "bag_file.hpp"
@@ -57,10 +57,19 @@ class BagMessages {
     std::size_t rank;
     std::size_t number;
     BagMessage message;
+
+    auto key() const { return std::make_tuple(message.time(), rank, number); }
+  };
+  /// The messages of a chunk, in order, as far as they have not been taken.
+  struct Loaded {
+    std::vector<Placed> messages;
+    std::size_t next{0};
+
+    const Placed& front() const { return messages[next]; }
   };
   /// Whether `a` comes after `b`.
   struct IsLater {
-    bool operator()(const Placed& a, const Placed& b) const;
+    bool operator()(const Loaded& a, const Loaded& b) const { return a.front().key() > b.front().key(); }
   };
 
   void load(const PlacedChunk& placed);
@@ -71,7 +80,7 @@ class BagMessages {
   std::size_t next_chunk_{0};
   std::size_t size_{0};
   std::size_t loaded_{0};
-  std::priority_queue<Placed, std::vector<Placed>, IsLater> messages_;
+  std::vector<Loaded> chunks_at_hand_;  ///< a heap, the one with the next message in front
 };
 
 }  // namespace urban_gnss

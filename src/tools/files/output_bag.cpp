@@ -87,6 +87,10 @@ OutputBag::Connections::iterator OutputBag::add_connection(const std::string& to
                                  .add(rosbag::CONNECTION_FIELD_NAME, connection.id)
                                  .add(rosbag::TOPIC_FIELD_NAME, topic),
                              kind.text());
+  append_sized(connection.message_header, Header(rosbag::OP_MSG_DATA)
+                                              .add(rosbag::CONNECTION_FIELD_NAME, connection.id)
+                                              .add(rosbag::TIME_FIELD_NAME, bytes_of({}))
+                                              .text());
   chunk_ += connection.record;
   return connections_.emplace(topic, std::move(connection)).first;
 }
@@ -94,10 +98,9 @@ OutputBag::Connections::iterator OutputBag::add_connection(const std::string& to
 std::uint8_t* OutputBag::begin_message(const Connection& connection, const ros::Time& time, std::uint32_t size) {
   if (time < ros::TIME_MIN) throw pending_.failure("a message's time is 0");
   entries_[connection.id].push_back({time, static_cast<std::uint32_t>(chunk_.size())});
-  append_sized(chunk_, Header(rosbag::OP_MSG_DATA)
-                           .add(rosbag::CONNECTION_FIELD_NAME, connection.id)
-                           .add(rosbag::TIME_FIELD_NAME, bytes_of(time))
-                           .text());
+  chunk_.append(connection.message_header.data(), connection.message_header.size() - 2 * sizeof(std::uint32_t));
+  append(chunk_, time.sec);
+  append(chunk_, time.nsec);
   append(chunk_, size);
   chunk_.resize(chunk_.size() + size);
   return reinterpret_cast<std::uint8_t*>(chunk_.data()) + chunk_.size() - size;
@@ -126,7 +129,8 @@ void OutputBag::end_chunk() {
     append(counts, count);
     std::string index;
     for (const Entry& entry : entries) {
-      index += bytes_of(entry.time);
+      append(index, entry.time.sec);
+      append(index, entry.time.nsec);
       append(index, entry.offset);
     }
     put(record(Header(rosbag::OP_INDEX_DATA)

@@ -46,6 +46,7 @@ class OutputBag {
   struct Connection {
     std::uint32_t id{0};
     std::string record;
+    std::string message_header;  ///< of every message, which ends with its time
   };
   struct Entry {
     ros::Time time;

@@ -175,12 +175,14 @@ std::optional<Trajectory> ReplayRun::take_truth() {
     std::cerr << "replay: the bag has a truth but no gps/datum; the truth is taken to be in the frame of the datum\n";
     return std::move(truth_);
   }
-  const LocalFrame theirs(*bag_datum_);
   Trajectory moved = std::move(truth_);
-  for (TimedPose& timed : moved) {
-    const Eigen::Vector3d point = pipeline_.frame()->to_local(theirs.to_geodetic({timed.pose.x, timed.pose.y, 0.0}));
-    timed.pose.x = point.x();
-    timed.pose.y = point.y();
+  if (!(*bag_datum_ == pipeline_.frame()->datum())) {
+    const LocalFrame theirs(*bag_datum_);
+    for (TimedPose& timed : moved) {
+      const Eigen::Vector3d point = pipeline_.frame()->to_local(theirs.to_geodetic({timed.pose.x, timed.pose.y, 0.0}));
+      timed.pose.x = point.x();
+      timed.pose.y = point.y();
+    }
   }
   sort_by_stamp(moved);
   return moved;
