@@ -1,5 +1,6 @@
 #include "urban_gnss_localization/common/covariance_faults.hpp"
 
+#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <cmath>
 #include <sstream>
@@ -10,6 +11,7 @@ namespace urban_gnss {
 namespace {
 
 constexpr double kRounding = 1e-6;  ///< relative
+constexpr int kMostAxes = 6;
 
 template <class... Parts>
 std::string text(const Parts&... parts) {
@@ -21,8 +23,8 @@ std::string text(const Parts&... parts) {
 
 }  // namespace
 
-std::string covariance_fault(const Eigen::MatrixXd& matrix, const std::vector<const char*>& axes) {
-  const auto name = [&](Eigen::Index i) { return axes[static_cast<std::size_t>(i)]; };
+std::string covariance_fault(const Eigen::Ref<const Eigen::MatrixXd>& matrix, std::initializer_list<const char*> axes) {
+  const auto name = [&](Eigen::Index i) { return axes.begin()[i]; };
   const Eigen::Index size = matrix.rows();
   for (Eigen::Index i = 0; i < size; ++i) {
     for (Eigen::Index j = 0; j < size; ++j) {
@@ -31,7 +33,8 @@ std::string covariance_fault(const Eigen::MatrixXd& matrix, const std::vector<co
     }
     if (matrix(i, i) < 0.0) return text("variance of ", name(i), " = ", matrix(i, i), ": must not be negative");
   }
-  Eigen::MatrixXd correlation = Eigen::MatrixXd::Identity(size, size);
+  using Correlation = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, kMostAxes, kMostAxes>;
+  Correlation correlation = Correlation::Identity(size, size);
   for (Eigen::Index i = 0; i < size; ++i) {
     for (Eigen::Index j = 0; j < i; ++j) {
       const double a = matrix(i, j), b = matrix(j, i);
@@ -47,7 +50,8 @@ std::string covariance_fault(const Eigen::MatrixXd& matrix, const std::vector<co
       correlation(i, j) = correlation(j, i) = scale > 0.0 ? a / scale : 0.0;
     }
   }
-  const double least = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(correlation).eigenvalues().minCoeff();
+  if (Eigen::LLT<Correlation>(correlation).info() == Eigen::Success) return {};
+  const double least = Eigen::SelfAdjointEigenSolver<Correlation>(correlation).eigenvalues().minCoeff();
   if (least < -kRounding) return text("the covariance is not positive semi-definite (least eigenvalue ", least, ")");
   return {};
 }

@@ -17,6 +17,8 @@ bool is_plausible(const Twist2& twist) {
   return twist.ground_speed_mps() <= kMaxSpeed_mps && std::abs(twist.yaw_rate_radps) <= kMaxYawRate_radps;
 }
 
+bool is_usable_yaw_rate(double yaw_rate_radps) { return std::abs(yaw_rate_radps) <= kMaxYawRate_radps; }
+
 std::string odometry_fault(const OdometrySample& sample) {
   if (!sample.has_pose && !sample.has_twist) return "neither a pose (its quaternion is 0) nor a twist (covariance -1)";
   const Twist2& twist = sample.twist;
@@ -25,7 +27,7 @@ std::string odometry_fault(const OdometrySample& sample) {
   }
   if (sample.has_pose && !is_finite(sample.pose)) return "pose is not finite";
   if (sample.has_twist && twist.ground_speed_mps() > kMaxSpeed_mps) return "speed is beyond 150 m/s";
-  if (sample.has_twist && std::abs(twist.yaw_rate_radps) > kMaxYawRate_radps) return "yaw rate is beyond 50 rad/s";
+  if (sample.has_twist && !is_usable_yaw_rate(twist.yaw_rate_radps)) return "yaw rate is beyond 50 rad/s";
   if (sample.has_pose && sample.pose.position().norm() > kMaxCoordinate_m) {
     return "pose is farther than 10 000 km from its origin";
   }

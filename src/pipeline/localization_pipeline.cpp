@@ -268,7 +268,8 @@ void LocalizationPipeline::correct_with(const ValidatedFix& fix) {
   const SatelliteEpoch* epoch = satellites_.take(stamp);
   if (epoch != nullptr && localizer_->takes_satellites()) {
     measurement.satellites = epoch->satellites;
-    for (SatelliteObservation& each : measurement.satellites) each.look.azimuth_rad -= convergence_rad();
+    const double turn_rad = convergence_rad();
+    for (SatelliteObservation& each : measurement.satellites) each.look.azimuth_rad -= turn_rad;
   }
 
   const bool is_spoilt = epoch != nullptr && residual_rms_m(epoch->satellites) > parameters_.integrity.residual_limit;

@@ -21,6 +21,8 @@ constexpr double kKept_s = 20.0;
 constexpr double kNewsworthy_s = 0.15;
 /// A contradiction that is shorter is a glitch, or wheels that slip for a moment.
 constexpr double kLasting_s = 1.0;
+/// From where an even rate would be to where it is; else it is searched for.
+constexpr int kMostSteps = 8;
 
 /// Whether an IMU of this verdict is used as it is told to be mounted.
 bool is_as_told(ImuVerdict verdict) {
@@ -28,12 +30,6 @@ bool is_as_told(ImuVerdict verdict) {
 }
 
 }  // namespace
-
-bool is_usable_yaw_rate(double yaw_rate_radps) {
-  OdometrySample as_odometry;
-  as_odometry.twist.yaw_rate_radps = yaw_rate_radps;
-  return odometry_fault(as_odometry).empty();
-}
 
 void YawRateSource::add(const ImuYawRate& rate) {
   while (!rates_.empty() && rates_.back().stamp >= rate.stamp) rates_.pop_back();  // the IMU's clock was set back
@@ -121,6 +117,22 @@ std::string YawRateSource::complaint() const {
 }
 
 std::size_t YawRateSource::first_after(Stamp stamp) const {
+  if (rates_.empty() || stamp < rates_.front().stamp) return 0;
+  if (stamp >= rates_.back().stamp) return rates_.size();
+  // An IMU's stamps are nearly even: from where it would be if they were, it is not far.
+  const double share =
+      to_seconds(stamp - rates_.front().stamp) / to_seconds(rates_.back().stamp - rates_.front().stamp);
+  const double last = static_cast<double>(rates_.size() - 1);
+  auto i = static_cast<std::size_t>(std::clamp(share * last, 0.0, last));
+  for (int step = 0; step < kMostSteps; ++step) {
+    if (rates_[i].stamp <= stamp) {
+      ++i;
+    } else if (rates_[i - 1].stamp > stamp) {
+      --i;
+    } else {
+      return i;
+    }
+  }
   const auto first = std::upper_bound(rates_.begin(), rates_.end(), stamp,
                                       [](Stamp value, const ImuYawRate& rate) { return value < rate.stamp; });
   return static_cast<std::size_t>(first - rates_.begin());
@@ -151,23 +163,25 @@ std::optional<ImuYawRate> YawRateSource::mean_between(Stamp since, Stamp until, 
   double gravity_count = 0.0;
   double gravity_sum = 0.0;
   int count = 0;
-  std::optional<ImuYawRate> before;
-  for (std::size_t i = first_after(since - from_seconds(kYawRateHold_s) - Stamp(1)); i < rates_.size(); ++i) {
+  const std::size_t first = first_after(since);
+  for (std::size_t i = first; i < rates_.size() && rates_[i].stamp <= until; ++i) {
     const ImuYawRate& rate = rates_[i];
-    if (rate.stamp > until) break;
-    if (rate.stamp <= since) {
-      if (to_seconds(since - rate.stamp) <= kYawRateHold_s && !is_glitch(i, odometry_radps)) before = rate;
-    } else if (is_glitch(i, odometry_radps)) {
+    if (is_glitch(i, odometry_radps)) {
       count_glitch(rate.told_radps, events);
-    } else {
-      sum.told_radps += rate.told_radps;
-      sum.any_axis_radps += rate.any_axis_radps;
-      gravity_sum += rate.by_gravity_radps.value_or(0.0);
-      if (rate.by_gravity_radps) ++gravity_count;
-      ++count;
+      continue;
     }
+    sum.told_radps += rate.told_radps;
+    sum.any_axis_radps += rate.any_axis_radps;
+    gravity_sum += rate.by_gravity_radps.value_or(0.0);
+    if (rate.by_gravity_radps) ++gravity_count;
+    ++count;
   }
-  if (count == 0) return before;
+  if (count == 0) {
+    for (std::size_t i = first; i > 0 && to_seconds(since - rates_[i - 1].stamp) <= kYawRateHold_s; --i) {
+      if (!is_glitch(i - 1, odometry_radps)) return rates_[i - 1];
+    }
+    return std::nullopt;
+  }
   sum.stamp = until;
   sum.told_radps /= count;
   sum.any_axis_radps /= count;

@@ -3,15 +3,15 @@
 #include <Eigen/Core>
 #include <cmath>
 #include <cstring>
+#include <initializer_list>
 #include <sstream>
-#include <vector>
 
 #include "urban_gnss_localization/common/covariance_faults.hpp"
 
 namespace urban_gnss {
 namespace {
 
-using Names = std::vector<const char*>;
+using Names = std::initializer_list<const char*>;
 
 const Names kPoseAxes = {"x", "y", "z", "roll", "pitch", "yaw"};
 const Names kTwistAxes = {"vx", "vy", "vz", "roll rate", "pitch rate", "yaw rate"};

@@ -23,6 +23,8 @@ bool is_plausible(const Twist2& twist);
 
 /// Why an odometry message was not used; empty where it can be: non-finite or absurd values, or neither pose nor twist.
 std::string odometry_fault(const OdometrySample& sample);
+/// Whether a yaw rate (rad/s) can be used, of the odometry or of an IMU: finite, and not beyond 50 rad/s.
+bool is_usable_yaw_rate(double yaw_rate_radps);
 
 /// The dead-reckoned path of the last seconds, so that a fix can be compared with the robot's pose at the fix's own
 /// stamp. The path is integrated from the twists and starts at the origin.

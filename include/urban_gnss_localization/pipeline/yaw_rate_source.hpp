@@ -26,9 +26,6 @@ struct YawRateParameters {
   }
 };
 
-/// Whether an IMU's yaw rate (rad/s) can be used: finite, and of a size that the odometry's may have.
-bool is_usable_yaw_rate(double yaw_rate_radps);
-
 /// The IMU's yaw rate in place of the odometry's, as long as it comes.
 ///
 /// A localizer that estimates the yaw rate's bias has one bias for both sources. While the odometry replaces the IMU,
