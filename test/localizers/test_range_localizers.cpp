@@ -128,7 +128,7 @@ TEST_P(RangeLocalizers, EveryRangeParameterHasAnEffect) {
       {"use_ranges: false", "{}"},
       {"range_sigma: 3.0", "{}"},
       {"range_sigma_min: 4.0", "fix_scale_rate: 0.3"},
-      {"range_sigma_max: 1.0", "{range_sigma: 0.7, fix_scale_rate: 0.3}"},  // which grows
+      {"range_sigma_max: 0.2", "range_sigma_min: 0.1\nrange_sigma: 0.1\nfix_scale_rate: 0.3"},  // which grows
       {"nlos_mean: 25.0", "{}"},
       {"nlos_sigma: 20.0", "{}"},
       {"nlos_elevation_exponent: 0.3", "{}"},
