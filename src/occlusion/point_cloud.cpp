@@ -1,15 +1,17 @@
 #include "urban_gnss_localization/occlusion/point_cloud.hpp"
 
-#include <pcl/io/pcd_io.h>
+#include <dlfcn.h>
 #include <pcl/kdtree/kdtree_flann.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <filesystem>
 #include <limits>
 #include <new>
 #include <stdexcept>
 
+#include "pcd/pcl_pcd.hpp"
 #include "pcd_header.hpp"
 #include "pcl_cloud.hpp"
 #include "urban_gnss_localization/common/pending_file.hpp"
@@ -18,6 +20,21 @@
 #include "urban_gnss_localization/occlusion/voxel_walk.hpp"
 
 namespace urban_gnss {
+namespace {
+
+/// A function of pcl_pcd, whose library lies beside this one. Throws std::runtime_error where it cannot be loaded.
+template <class Function>
+Function* pcl_function(const char* name) {
+  Dl_info here{};
+  const bool is_known = dladdr(reinterpret_cast<const void*>(&check_pcd), &here) != 0 && here.dli_fname != nullptr;
+  const auto folder = is_known ? std::filesystem::path(here.dli_fname).parent_path() : std::filesystem::path();
+  void* const library = dlopen((folder / pcl_pcd::kLibrary).c_str(), RTLD_NOW | RTLD_LOCAL);
+  void* const function = library != nullptr ? dlsym(library, name) : nullptr;
+  if (function == nullptr) throw std::runtime_error(std::string("PCL's .pcd files: ") + dlerror());
+  return reinterpret_cast<Function*>(function);
+}
+
+}  // namespace
 
 PointCloud finite_points(const PointCloud& cloud) {
   PointCloud finite;
@@ -101,29 +118,23 @@ double sample_spacing_m(const PointCloud& cloud) {
 
 PointCloud read_pcd(const std::string& path) {
   if (check_pcd(path) == 0) return {};  // PCL looks at the first point all the same
-  pcl::PointCloud<pcl::PointXYZ> points;
+  PointCloud cloud;
   try {
-    if (pcl::io::loadPCDFile(path, points) < 0) throw std::runtime_error("PCL refuses it");
+    static auto* const read = pcl_function<pcl_pcd::Read>(pcl_pcd::kRead);
+    if (!read(path, cloud)) throw std::runtime_error("PCL refuses it");
   } catch (const std::bad_alloc&) {
     throw std::runtime_error(path + ": not enough memory for it");
   } catch (const std::exception& error) {
     throw std::runtime_error(path + ": cannot be read as a .pcd file: " + error.what());
   }
-  PointCloud cloud;
-  cloud.reserve(points.size());
-  for (const pcl::PointXYZ& point : points) cloud.emplace_back(point.x, point.y, point.z);
   return cloud;
 }
 
 void write_pcd(const std::string& path, const PointCloud& cloud) {
-  const auto points = to_pcl(cloud);
-  if (points->empty()) throw std::runtime_error(path + ": an empty cloud is not written");
+  if (cloud.empty()) throw std::runtime_error(path + ": an empty cloud is not written");
+  static auto* const write = pcl_function<pcl_pcd::Write>(pcl_pcd::kWrite);
   PendingFile pending(path);
-  try {
-    if (pcl::io::savePCDFileBinary(pending.path().string(), *points) != 0) throw pending.failure();
-  } catch (const pcl::IOException&) {
-    throw pending.failure();
-  }
+  if (!write(pending.path().string(), cloud)) throw pending.failure();
   pending.commit();
 }
 
