@@ -329,38 +329,40 @@ VoxelMap::Index VoxelMap::find(const Eigen::Vector3d& point) const {
 
 std::size_t VoxelMap::find_nearby(Index index, const VoxelCoordinates& cell, const VoxelCoordinates& low,
                                   const VoxelCoordinates& high, NearbyVoxels& found) const {
-  // For each axis and each of the three cells along it: the voxels in the box, the place in the brick, and whether
-  // that is another brick.
-  std::uint64_t slabs[3][3];
-  std::uint32_t places[3][3];
-  std::uint32_t is_beyond[3][3];
+  // For each axis: which coordinates are in the box.
+  const std::uint32_t ranges[3] = {cell_bits::nearby_range(cell.x(), low.x(), high.x()),
+                                   cell_bits::nearby_range(cell.y(), low.y(), high.y()),
+                                   cell_bits::nearby_range(cell.z(), low.z(), high.z())};
   std::uint32_t wanted_cells = nearby_[index];
-  for (unsigned axis = 0; axis < 3; ++axis) {
-    for (unsigned side = 0; side < 3; ++side) {
-      const int at = cell[axis] + static_cast<int>(side) - 1;
-      slabs[axis][side] = cell_bits::slab(axis, at, low[axis], high[axis]);
-      places[axis][side] = cell_bits::place_along(axis, at);
-      is_beyond[axis][side] = static_cast<std::uint32_t>((at ^ cell[axis]) >> 2 & 1) << axis;
-      if (slabs[axis][side] == 0) wanted_cells &= ~cell_bits::kNearbyAlong[axis][side];
+  for (std::size_t axis = 0; axis < 3; ++axis) wanted_cells &= cell_bits::nearby_of_range(axis, ranges[axis]);
+  if (wanted_cells == 0) return 0;
+  // For each axis and each of the three cells along it: the voxels in the box.
+  std::uint64_t slabs[3][3];
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    for (std::uint32_t side = 0; side < 3; ++side) {
+      slabs[axis][side] = cell_bits::kSlabOf[axis][ranges[axis] >> 4 * side & 15U];
     }
   }
-  if (wanted_cells == 0) return 0;
   // The bricks that the cell's neighbours are in: beyond it along none, one, two or all axes.
   std::array<Index, 8> bricks;
   bricks.fill(kNone);
   bricks[0] = index / kPlaces;
+  const auto& neighbours = cell_bits::kNeighbours[index % kPlaces];
   std::size_t count = 0;
   for (; wanted_cells != 0; wanted_cells &= wanted_cells - 1) {
-    const auto& [x, y, z] = cell_bits::kNearbySides[static_cast<std::size_t>(__builtin_ctz(wanted_cells))];
-    Index& brick = bricks[is_beyond[0][x] | is_beyond[1][y] | is_beyond[2][z]];
+    const auto neighbour = static_cast<std::size_t>(__builtin_ctz(wanted_cells));
+    const auto& [x, y, z] = cell_bits::kNearbySides[neighbour];
+    const Index place = neighbours[neighbour];
+    Index& brick = bricks[place / kPlaces];
     if (brick == kNone) brick = find_brick(brick_of({cell.x() + x - 1, cell.y() + y - 1, cell.z() + z - 1}));
-    const Index other = kPlaces * brick + (places[0][x] | places[1][y] | places[2][z]);
+    const Index other = kPlaces * brick + place % kPlaces;
     const std::uint64_t mask = masks_[other];
     const std::uint64_t wanted = mask & slabs[0][x] & slabs[1][y] & slabs[2][z];
-    if (wanted == 0) continue;
     const Index begin = blocks_[other].begin;
-    __builtin_prefetch(&surface_[begin + cell_bits::rank(mask, wanted & (~wanted + 1))]);
-    found[count++] = {begin, mask, wanted};
+    __builtin_prefetch(&surface_[begin]);
+    // Written down in any case, and the next one over it where nothing is wanted: that is quicker than to jump.
+    found[count] = {begin, mask, wanted};
+    count += static_cast<std::size_t>(wanted != 0);
   }
   return count;
 }

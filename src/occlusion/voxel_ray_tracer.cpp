@@ -5,6 +5,10 @@
 #include <cmath>
 #include <cstdint>
 
+#include "float4.hpp"
+#include "ray_neighbourhood.hpp"
+#include "urban_gnss_localization/common/vector_math.hpp"
+
 namespace urban_gnss {
 namespace {
 
@@ -14,117 +18,132 @@ constexpr double kMargin_m = 0.01;
 /// circle about the largest equilateral triangle, the largest hole that three linked points can close.
 const double kReach = 1.0 / std::sqrt(3.0);
 
-/// Points about a stretch of a ray, seen along it.
-class RayNeighbourhood {
- public:
-  /// As many as a mask has bits.
-  static constexpr std::size_t kCapacity = 64;
+/// The greatest single number that is not above this one.
+float at_most(double value) {
+  const auto single = static_cast<float>(value);
+  return static_cast<double>(single) <= value ? single : std::nextafter(single, -1.0F);
+}
 
-  void clear() { count_ = 0; }
-
-  /// `place` (m): x and y in the plane normal to the ray, the ray at the origin, z along it. Where there is no room the
-  /// point farthest from the ray gives way.
-  void add(const Eigen::Vector4f& place, const Eigen::Vector3f& point) {
-    const Eigen::Vector2f across = place.head<2>();
-    std::size_t slot = count_;
-    if (count_ == kCapacity) {
-      slot = 0;
-      for (std::size_t i = 1; i < kCapacity; ++i) {
-        if (across_[i].squaredNorm() > across_[slot].squaredNorm()) slot = i;
-      }
-      if (across_[slot].squaredNorm() <= across.squaredNorm()) return;
-    } else {
-      ++count_;
-    }
-    across_[slot] = across;
-    point_[slot] = point;
-    along_m_[slot] = place.z();
-  }
-
-  /// Whether the ray is between the points at all: no half-plane through it holds them all.
-  bool is_surrounded() const {
-    if (count_ < 3) return false;
-    Eigen::Vector2f right = across_[0];  // the points' sector, counter-clockwise from right to left, under 180 degrees
-    Eigen::Vector2f left = across_[0];
-    for (std::size_t i = 1; i < count_; ++i) {
-      const bool left_of_right = cross(right, across_[i]) >= 0.0F;
-      const bool right_of_left = cross(across_[i], left) >= 0.0F;
-      if (left_of_right && right_of_left) continue;
-      if (!left_of_right && !right_of_left) return true;
-      (left_of_right ? left : right) = across_[i];
-    }
-    return false;
-  }
-
-  /// Whether the ray pierces a triangle of points mutually within `link_m`; sets the range at which it does.
-  bool pierced(float link_m, double& range_m) const {
-    std::array<std::uint64_t, kCapacity> linked{};
-    std::array<std::uint64_t, kCapacity> left_of{};  // points less than 180 degrees counter-clockwise
-    const float limit = link_m * link_m;
-    // Without jumps, which would be foretold wrongly half the time.
-    for (std::size_t i = 0; i < count_; ++i) {
-      for (std::size_t j = i + 1; j < count_; ++j) {
-        const std::uint64_t is_linked = (point_[i] - point_[j]).squaredNorm() > limit ? 0U : 1U;
-        const std::uint64_t is_left = cross(across_[i], across_[j]) > 0.0F ? 1U : 0U;
-        linked[i] |= is_linked << j;
-        linked[j] |= is_linked << i;
-        left_of[i] |= (is_linked & is_left) << j;
-        left_of[j] |= (is_linked & ~is_left) << i;
-      }
-    }
-    for (std::size_t i = 0; i < count_; ++i) {
-      for (std::uint64_t rest = left_of[i]; rest != 0; rest &= rest - 1) {
-        const auto j = static_cast<std::size_t>(__builtin_ctzll(rest));
-        // k is left of j, and i is left of k.
-        const std::uint64_t third = linked[i] & left_of[j] & ~left_of[i];
-        if (third == 0) continue;
-        const auto k = static_cast<std::size_t>(__builtin_ctzll(third));
-        range_m = crossing_m(i, j, k);
-        return true;
-      }
-    }
-    return false;
-  }
-
- private:
-  static float cross(const Eigen::Vector2f& a, const Eigen::Vector2f& b) { return a.x() * b.y() - a.y() * b.x(); }
-
-  /// By the barycentric coordinates of the origin.
-  double crossing_m(std::size_t i, std::size_t j, std::size_t k) const {
-    const float wi = cross(across_[j], across_[k]);
-    const float wj = cross(across_[k], across_[i]);
-    const float wk = cross(across_[i], across_[j]);
-    return (wi * along_m_[i] + wj * along_m_[j] + wk * along_m_[k]) / (wi + wj + wk);
-  }
-
-  std::size_t count_{0};
-  std::array<Eigen::Vector2f, kCapacity> across_;
-  std::array<Eigen::Vector3f, kCapacity> point_;
-  std::array<float, kCapacity> along_m_;
-};
-
-/// Places as a ray sees them: x and y (m) across it, z (m) along it, the fourth number unused. Written by columns,
-/// which are added as whole vectors.
+/// How a ray sees points: their distances across it, x and y, and along it (m).
 class RayFrame {
  public:
+  struct Places {
+    Float4 across_x;
+    Float4 across_y;
+    Float4 along_m;
+  };
+
   RayFrame(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) : origin_(origin.cast<float>()) {
-    const Eigen::Vector3f along = direction.cast<float>();
-    const Eigen::Vector3f u = along.unitOrthogonal();
-    axes_ << u.transpose(), along.cross(u).transpose(), along.transpose(), Eigen::RowVector3f::Zero();
+    along_ = direction.cast<float>();
+    right_ = along_.unitOrthogonal();
+    up_ = along_.cross(right_);
   }
 
-  Eigen::Vector4f turned(const Eigen::Vector3f& offset) const {
-    return axes_.col(0) * offset.x() + axes_.col(1) * offset.y() + axes_.col(2) * offset.z();
-  }
   /// Shifted so that the ray is kept off the lines between points of a regular grid.
-  Eigen::Vector4f place(const Eigen::Vector3f& point) const {
-    return turned(point - origin_) + Eigen::Vector4f(6e-5F, 8e-5F, 0.0F, 0.0F);
+  Places places(Float4 x, Float4 y, Float4 z) const {
+    x -= origin_.x();
+    y -= origin_.y();
+    z -= origin_.z();
+    return {of(right_, x, y, z) + 6e-5F, of(up_, x, y, z) + 8e-5F, of(along_, x, y, z)};
   }
 
  private:
-  Eigen::Matrix<float, 4, 3> axes_;
+  static Float4 of(const Eigen::Vector3f& axis, Float4 x, Float4 y, Float4 z) {
+    return axis.x() * x + axis.y() * y + axis.z() * z;
+  }
+
   Eigen::Vector3f origin_;
+  Eigen::Vector3f right_;
+  Eigen::Vector3f up_;
+  Eigen::Vector3f along_;
 };
+
+/// Which points count about a stretch of a ray, and which of them are solid.
+struct Limits {
+  float squared_reach;  ///< m^2, across the ray
+  float nearest_m;      ///< along it
+  float farthest_m;
+  float max_permeability;
+};
+
+/// Voxels about a stretch of a ray, and how the ray sees them: four at a time, and in memory of which only the first
+/// part is touched.
+class Candidates {
+ public:
+  /// Puts the voxels that are asked for in these cells, if they are within the limits, into `solid` and `permeable`.
+  void sort(const VoxelMap& map, const VoxelMap::NearbyVoxels& nearby, std::size_t cells, const RayFrame frame,
+            const Limits limits, RayNeighbourhood& solid, RayNeighbourhood& permeable) {
+    const std::size_t count = gather(map, nearby, cells);
+    std::size_t solids = 0;
+    std::size_t permeables = 0;
+    for (std::size_t first = 0; first < count; first += 4) {
+      Float4 x = load4(surfaces_[first].data());
+      Float4 y = load4(surfaces_[first + 1].data());
+      Float4 z = load4(surfaces_[first + 2].data());
+      Float4 permeability = load4(surfaces_[first + 3].data());
+      transpose4(x, y, z, permeability);
+      const auto [across_x, across_y, along_m] = frame.places(x, y, z);
+      store4(&across_x_[first], across_x);
+      store4(&across_y_[first], across_y);
+      store4(&along_m_[first], along_m);
+      const Mask4 is_in_reach = (across_x * across_x + across_y * across_y <= limits.squared_reach) &
+                                (along_m >= limits.nearest_m) & (along_m <= limits.farthest_m);
+      const Mask4 is_solid = permeability <= limits.max_permeability;
+      const std::uint32_t solid_bits = bits_of(is_in_reach & is_solid);
+      const std::uint32_t permeable_bits = bits_of(is_in_reach & ~is_solid);
+      // All are written down, and the next one over those that are left out: that is quicker than to jump.
+      for (std::uint32_t lane = 0; lane < 4; ++lane) {
+        solid_[solids] = static_cast<std::uint16_t>(first + lane);
+        solids += solid_bits >> lane & 1U;
+      }
+      if (permeable_bits == 0) continue;
+      for (std::uint32_t lane = 0; lane < 4; ++lane) {
+        permeable_[permeables] = static_cast<std::uint16_t>(first + lane);
+        permeables += permeable_bits >> lane & 1U;
+      }
+    }
+    add(solid_, solids, solid);
+    add(permeable_, permeables, permeable);
+  }
+
+ private:
+  static constexpr std::size_t kMost = 27 * cell_bits::kPlaces;  ///< in a cell and its neighbours
+  static constexpr float kNowhere = 1e9F;                        ///< m, beyond every limit
+  using Chosen = std::array<std::uint16_t, kMost + 1>;
+
+  /// The number of voxels, and nowhere's up to the next multiple of four.
+  std::size_t gather(const VoxelMap& map, const VoxelMap::NearbyVoxels& nearby, std::size_t cells) {
+    std::size_t count = 0;
+    for (std::size_t i = 0; i < cells; ++i) {
+      VoxelMap::for_each_wanted(
+          nearby[i], [&](VoxelMap::Index voxel) { store4(surfaces_[count++].data(), load4(map.surface(voxel))); });
+    }
+    for (std::size_t i = count; i % 4 != 0; ++i) store4(surfaces_[i].data(), all4(kNowhere));
+    return count;
+  }
+
+  void add(const Chosen& chosen, std::size_t count, RayNeighbourhood& to) const {
+    to.clear();
+    for (std::size_t k = 0; k < count; ++k) {
+      const std::size_t i = chosen[k];
+      to.add(surfaces_[i].data(), across_x_[i], across_y_[i], along_m_[i]);
+    }
+  }
+
+  std::array<std::array<float, 4>, kMost> surfaces_;  ///< as VoxelMap::surface() gives them
+  std::array<float, kMost> across_x_;
+  std::array<float, kMost> across_y_;
+  std::array<float, kMost> along_m_;
+  Chosen solid_;
+  Chosen permeable_;
+};
+
+/// Candidates::sort() with the widest instructions that the processor has.
+URBAN_GNSS_VECTORISED void sort_nearby(Candidates& candidates, const VoxelMap& map,
+                                       const VoxelMap::NearbyVoxels& nearby, std::size_t cells, const RayFrame& frame,
+                                       const Limits& limits, RayNeighbourhood& solid, RayNeighbourhood& permeable) {
+  candidates.sort(map, nearby, cells, frame, limits, solid, permeable);
+}
 
 /// The part of a ray inside a box; empty (begin > end) where it misses it.
 struct Stretch {
@@ -184,12 +203,12 @@ RayOutcome VoxelRayTracer::trace(const Eigen::Vector3d& origin, const Eigen::Vec
   const auto link_m = static_cast<float>(link_m_);
   const double reach_m = kReach * link_m_;
   const auto squared_reach = static_cast<float>(reach_m * reach_m);
+  const float max_permeability = at_most(parameters_.max_permeability);
   const double inverse_voxel = 1.0 / map_->parameters().voxel_size;
   RayNeighbourhood solid;
   RayNeighbourhood permeable;
   VoxelMap::NearbyVoxels nearby;
-  std::array<Eigen::Vector4f, cell_bits::kPlaces> places;
-  std::array<VoxelMap::Index, cell_bits::kPlaces> voxels;
+  Candidates candidates;
 
   const auto visit = [&](VoxelMap::Index center, const VoxelCoordinates& cell, double from_m, double to_m) {
     // The voxels that the box about the stretch, widened by the reach, touches: in the cell and its neighbours.
@@ -199,32 +218,15 @@ RayOutcome VoxelRayTracer::trace(const Eigen::Vector3d& origin, const Eigen::Vec
     const VoxelCoordinates high = voxel_of((a.cwiseMax(b).array() + reach_m).matrix(), inverse_voxel);
     const std::size_t cells = map_->find_nearby(center, cell, low, high, nearby);
     if (cells == 0) return true;
-    solid.clear();
-    permeable.clear();
-    const auto nearest_m = static_cast<float>(std::max(from_m - reach_m, parameters_.min_range));
-    const auto farthest_m = static_cast<float>(std::min(to_m + reach_m, parameters_.max_range));
-    for (std::size_t i = 0; i < cells; ++i) {
-      // All are written down, and the next one over those that are out of reach: that is quicker than to jump.
-      std::size_t count = 0;
-      VoxelMap::for_each_wanted(nearby[i], [&](VoxelMap::Index voxel) {
-        const Eigen::Vector4f place = frame.place(map_->position(voxel));
-        places[count] = place;
-        voxels[count] = voxel;
-        const bool is_near = place.head<2>().squaredNorm() <= squared_reach;
-        const bool is_along = (place.z() >= nearest_m) & (place.z() <= farthest_m);
-        count += static_cast<std::size_t>(is_near & is_along);
-      });
-      for (std::size_t k = 0; k < count; ++k) {
-        const bool is_solid = map_->permeability(voxels[k]) <= parameters_.max_permeability;
-        (is_solid ? solid : permeable).add(places[k], map_->position(voxels[k]));
-      }
-    }
-    if (solid.is_surrounded() && solid.pierced(link_m, outcome.range_m)) {
+    const Limits limits{squared_reach, static_cast<float>(std::max(from_m - reach_m, parameters_.min_range)),
+                        static_cast<float>(std::min(to_m + reach_m, parameters_.max_range)), max_permeability};
+    sort_nearby(candidates, *map_, nearby, cells, frame, limits, solid, permeable);
+    if (solid.pierced(link_m, outcome.range_m)) {
       outcome.blocked = true;
       return false;
     }
     double unused_m = 0.0;
-    if (permeable.is_surrounded() && permeable.pierced(link_m, unused_m)) outcome.vegetation_m += to_m - from_m;
+    if (permeable.pierced(link_m, unused_m)) outcome.vegetation_m += to_m - from_m;
     return true;
   };
 
@@ -232,9 +234,11 @@ RayOutcome VoxelRayTracer::trace(const Eigen::Vector3d& origin, const Eigen::Vec
   const auto visit_brick = [&](const VoxelCoordinates& coordinates, double brick_from_m, double brick_to_m) {
     const VoxelMap::Index brick = map_->find_brick(coordinates);
     if (brick == VoxelMap::kNone) return true;
+    const VoxelCoordinates first = VoxelMap::kBrickCells * coordinates;
     by_cell.walk(brick_from_m, brick_to_m, [&](const VoxelCoordinates& cell, double from_m, double to_m) {
       // On the border rounding may lead into the next brick, for less than a hair's breadth.
-      if (VoxelMap::brick_of(cell) != coordinates) return true;
+      const VoxelCoordinates inside = cell - first;
+      if (((inside.x() | inside.y() | inside.z()) & ~(VoxelMap::kBrickCells - 1)) != 0) return true;
       const VoxelMap::Index found = map_->find_cell(brick, cell);
       return found == VoxelMap::kNone || visit(found, cell, from_m, to_m);
     });

@@ -60,17 +60,39 @@ inline std::uint64_t slab(std::size_t axis, int cell, int low, int high) {
   return from(low) & ~from(high + 1);
 }
 
-/// The part of place_of() that a coordinate along one axis makes up.
-inline std::uint32_t place_along(unsigned axis, int at) {
-  return static_cast<std::uint32_t>((at & 1) | (at & 2) << 2) << axis;
-}
-
 /// For each axis the nearby_bit()s of the nine cells on its low side, in its middle and on its high side.
 inline constexpr std::array<std::array<std::uint32_t, 3>, 3> kNearbyAlong{{
     {0x00001FFU, 0x003FE00U, 0x7FC0000U},
     {0x01C0E07U, 0x0E07038U, 0x70381C0U},
     {0x1249249U, 0x2492492U, 0x4924924U},
 }};
+
+/// For each axis, the bits of a cell's voxels that are at these of the four coordinates along it, one bit each.
+inline constexpr std::array<std::array<std::uint64_t, 16>, 3> kSlabOf = [] {
+  std::array<std::array<std::uint64_t, 16>, 3> slabs{};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    for (std::size_t coordinates = 0; coordinates < 16; ++coordinates) {
+      for (std::size_t at = 0; at < kSide; ++at) {
+        if ((coordinates >> at & 1U) != 0) slabs[axis][coordinates] |= kFrom[axis][at] & ~kFrom[axis][at + 1];
+      }
+    }
+  }
+  return slabs;
+}();
+
+/// A bit for each of the twelve coordinates along one axis of a cell with this coordinate and of its two neighbours: 1
+/// from `low` to `high`, both included. `high` is not below the cell's low neighbour.
+inline std::uint32_t nearby_range(int cell, int low, int high) {
+  const int first = std::max(low - kSide * (cell - 1), 0);
+  const int last = std::min(high - kSide * (cell - 1), 3 * kSide - 1);
+  return (2U << static_cast<unsigned>(last)) - (1U << static_cast<unsigned>(first));
+}
+
+/// The nearby_bit()s of the cells that a nearby_range() along this axis touches.
+inline std::uint32_t nearby_of_range(std::size_t axis, std::uint32_t range) {
+  return ((range & 0x00FU) != 0 ? kNearbyAlong[axis][0] : 0U) | ((range & 0x0F0U) != 0 ? kNearbyAlong[axis][1] : 0U) |
+         ((range & 0xF00U) != 0 ? kNearbyAlong[axis][2] : 0U);
+}
 
 /// For each nearby_bit(), from the lowest on, the sides of the three axes: 0, 1 or 2.
 inline constexpr std::array<std::array<std::uint8_t, 3>, 27> kNearbySides = [] {
@@ -81,6 +103,24 @@ inline constexpr std::array<std::array<std::uint8_t, 3>, 27> kNearbySides = [] {
     sides[i][2] = static_cast<std::uint8_t>(i % 3);
   }
   return sides;
+}();
+
+/// For each place in a brick and each nearby_bit() the neighbour's place in its brick, plus kPlaces times the sum of 1,
+/// 2 and 4 where that is another brick along x, y and z.
+inline constexpr std::array<std::array<std::uint16_t, 27>, kPlaces> kNeighbours = [] {
+  std::array<std::array<std::uint16_t, 27>, kPlaces> neighbours{};
+  for (std::uint32_t place = 0; place < kPlaces; ++place) {
+    for (std::size_t i = 0; i < 27; ++i) {
+      std::uint32_t neighbour = 0;
+      for (std::uint32_t axis = 0; axis < 3; ++axis) {
+        const std::uint32_t from = (place >> axis & 1U) | (place >> axis >> 2U & 2U);
+        const std::uint32_t to = from + kNearbySides[i][axis] + 3;  // of two bricks' eight cells, shifted by four
+        neighbour |= ((to & 1U) | (to & 2U) << 2U) << axis | (to < 4 || to > 7 ? kPlaces << axis : 0U);
+      }
+      neighbours[place][i] = static_cast<std::uint16_t>(neighbour);
+    }
+  }
+  return neighbours;
 }();
 
 }  // namespace urban_gnss::cell_bits

@@ -88,6 +88,8 @@ class VoxelMap {
   /// The voxel that holds the point, or kNone. An index is valid until something is added or dropped.
   Index find(const Eigen::Vector3d& point) const;
   const Eigen::Vector3f& position(Index voxel) const { return surface_[voxel].mean; }
+  /// Its mean's x, y and z and its permeability, to be read together.
+  const float* surface(Index voxel) const { return surface_[voxel].mean.data(); }
   std::uint32_t returns(Index voxel) const { return counts_[voxel].returns; }
 
   /// Of the followed rays that met the voxel's mean, the share that went past it; 0 until kMinEvidence of them did.

@@ -119,7 +119,7 @@ class GridRay {
     VoxelCoordinates voxel(floor_to_int(start.x()), floor_to_int(start.y()), floor_to_int(start.z()));
     double next_m[3];
     for (int axis = 0; axis < 3; ++axis) {
-      const double to_face = step_[axis] > 0 ? voxel[axis] + 1 - start[axis] : start[axis] - voxel[axis];
+      const double to_face = std::abs(voxel[axis] + (step_[axis] > 0 ? 1 : 0) - start[axis]);
       next_m[axis] = step_[axis] == 0 ? stride_m_[axis] : begin_m + to_face * stride_m_[axis];
     }
     NextFaces faces(next_m, stride_m_);
