@@ -3,7 +3,25 @@
 #include <algorithm>
 #include <cmath>
 
+#include "urban_gnss_localization/common/vector_math.hpp"
+
 namespace urban_gnss {
+
+/// A few points that are added together, and where they are in the map.
+struct PointBatch {
+  static constexpr std::size_t kSize = 32;
+
+  std::size_t count{0};
+  alignas(64) std::array<float, kSize> x, y, z;  ///< m
+  alignas(64) std::array<std::int32_t, kSize> voxel_x, voxel_y, voxel_z;
+  alignas(64) std::array<std::uint32_t, kSize> in_cell;   ///< cell_bits::place_of() the voxel
+  alignas(64) std::array<std::uint32_t, kSize> in_brick;  ///< and its cell
+  std::array<KeyIndex::Index, kSize> cell;                ///< kNone where there is no brick yet
+  std::array<KeyIndex::Index, kSize> voxel;               ///< kNone where it is not there yet
+
+  VoxelCoordinates coordinates(std::size_t i) const { return {voxel_x[i], voxel_y[i], voxel_z[i]}; }
+};
+
 namespace {
 
 /// In voxel edges: nearer than this a followed ray meets a voxel's mean. The same for those that end there and those
@@ -17,6 +35,24 @@ constexpr double kDropInterval = 0.05;
 constexpr double kLimitReserve = 0.1;
 
 static_assert(VoxelMap::kCellVoxels == 4 && VoxelMap::kBrickCells == 4);
+
+URBAN_GNSS_INLINE std::uint32_t interleaved(std::int32_t x, std::int32_t y, std::int32_t z) {
+  return static_cast<std::uint32_t>((x & 1) | (y & 1) << 1 | (z & 1) << 2 | (x & 2) << 2 | (y & 2) << 3 | (z & 2) << 4);
+}
+
+/// Places all of a batch, whether used or not: the points' voxels, and the places in cell and brick.
+URBAN_GNSS_VECTORISED void place_all(PointBatch& batch, double inverse_voxel) {
+  for (std::size_t i = 0; i < PointBatch::kSize; ++i) {
+    const std::int32_t x = floor_to_int(batch.x[i] * inverse_voxel);
+    const std::int32_t y = floor_to_int(batch.y[i] * inverse_voxel);
+    const std::int32_t z = floor_to_int(batch.z[i] * inverse_voxel);
+    batch.voxel_x[i] = x;
+    batch.voxel_y[i] = y;
+    batch.voxel_z[i] = z;
+    batch.in_cell[i] = interleaved(x, y, z);
+    batch.in_brick[i] = interleaved(x >> 2, y >> 2, z >> 2);
+  }
+}
 
 /// Calls visit(dx, dy, dz) for a cell and its neighbours.
 template <class Visit>
@@ -73,54 +109,54 @@ InsertReport VoxelMap::add_points(const PointCloud& points) {
   return report;
 }
 
-/// In three goes through a few points at a time, each of which asks for the memory of the next: so the points wait for
-/// memory together.
+/// In several goes through a few points at a time, each of which asks for the memory of the next: so the points wait
+/// for memory together.
 void VoxelMap::add_points_of(const PointCloud& points, InsertReport& report) {
-  struct Place {
-    VoxelCoordinates voxel;
-    Index cell;  ///< kNone where there is no brick yet
-    std::uint64_t bit;
-  };
-  constexpr std::size_t kTogether = 32;
-  std::array<Place, kTogether> places;
+  PointBatch batch{};
   BrickCursor cursor;
-  for (std::size_t begin = 0; begin < points.size(); begin += kTogether) {
-    const std::size_t count = std::min(kTogether, points.size() - begin);
-    for (std::size_t i = 0; i < count; ++i) {
-      const Eigen::Vector3f& point = points[begin + i];
-      Place& place = places[i];
-      place.bit = 0;
-      if (!is_usable(point)) continue;
-      place.voxel = voxel_of(point.cast<double>(), inverse_voxel_);
-      place.bit = cell_bits::bit_of(place.voxel);
-      const VoxelCoordinates cell = cell_of(place.voxel);
-      const Index brick = find_brick(brick_of(cell), cursor);
-      place.cell = brick == kNone ? kNone : kPlaces * brick + cell_bits::place_of(cell);
-      if (brick == kNone) continue;
-      __builtin_prefetch(&masks_[place.cell]);
-      __builtin_prefetch(&blocks_[place.cell]);
-    }
-    for (std::size_t i = 0; i < count; ++i) {
-      const Place& place = places[i];
-      if (place.bit == 0 || place.cell == kNone) continue;
-      const Index voxel = blocks_[place.cell].begin + cell_bits::rank(masks_[place.cell], place.bit);
-      __builtin_prefetch(surface_.data() + voxel, 1);
-      __builtin_prefetch(counts_.data() + voxel, 1);
-    }
-    for (std::size_t i = 0; i < count; ++i) {
-      const Place& place = places[i];
-      if (place.bit == 0) {
+  for (std::size_t next = 0; next < points.size();) {
+    for (batch.count = 0; batch.count < PointBatch::kSize && next < points.size(); ++next) {
+      const Eigen::Vector3f& point = points[next];
+      if (!is_usable(point)) {
         ++report.unusable;
         continue;
       }
-      const Eigen::Vector3f& point = points[begin + i];
-      if (place.cell == kNone || (masks_[place.cell] & place.bit) == 0) {
-        add_to_new_voxel(point, place.voxel, report);
-        cursor = {};
-        continue;
-      }
-      add_to(blocks_[place.cell].begin + cell_bits::rank(masks_[place.cell], place.bit), point);
+      batch.x[batch.count] = point.x();
+      batch.y[batch.count] = point.y();
+      batch.z[batch.count] = point.z();
+      ++batch.count;
     }
+    add_batch(batch, cursor, report);
+  }
+}
+
+void VoxelMap::add_batch(PointBatch& batch, BrickCursor& cursor, InsertReport& report) {
+  place_all(batch, inverse_voxel_);
+  for (std::size_t i = 0; i < batch.count; ++i) {
+    const Index brick = find_brick(brick_of(cell_of(batch.coordinates(i))), cursor);
+    batch.cell[i] = brick == kNone ? kNone : kPlaces * brick + batch.in_brick[i];
+    if (brick != kNone) __builtin_prefetch(&cells_[batch.cell[i]]);
+  }
+  const auto find = [&](std::size_t i) {
+    return batch.cell[i] == kNone ? kNone : find_voxel(batch.cell[i], std::uint64_t{1} << batch.in_cell[i]);
+  };
+  bool is_any_new = false;
+  for (std::size_t i = 0; i < batch.count; ++i) {
+    const Index voxel = batch.voxel[i] = find(i);
+    is_any_new = is_any_new || voxel == kNone;
+    if (voxel == kNone) continue;
+    __builtin_prefetch(surface_.data() + voxel, 1);
+    __builtin_prefetch(counts_.data() + voxel, 1);
+  }
+  for (std::size_t i = 0; i < batch.count; ++i) {
+    const Eigen::Vector3f point(batch.x[i], batch.y[i], batch.z[i]);
+    const Index voxel = is_any_new ? find(i) : batch.voxel[i];  // a new one moves others
+    if (voxel != kNone) {
+      add_to(voxel, point);
+      continue;
+    }
+    add_to_new_voxel(point, batch.coordinates(i), report);
+    cursor = {};
   }
 }
 
@@ -144,8 +180,8 @@ void VoxelMap::add_voxel(const Eigen::Vector3f& point, const VoxelCoordinates& c
   const std::uint64_t bit = cell_bits::bit_of(coordinates);
   const VoxelCoordinates cell_coordinates = cell_of(coordinates);
   const Index found = find_cell(cell_coordinates);
-  const Index cell = found != kNone && masks_[found] != 0 ? found : occupy(cell_coordinates);
-  Block& block = blocks_[cell];
+  const Index cell = found != kNone && cells_[found].mask != 0 ? found : occupy(cell_coordinates);
+  Cell& block = cells_[cell];
   if (block.count == 0 || block.count == room(block.size_class)) {
     const std::size_t size_class = block.count == 0 ? 0 : block.size_class + 1U;
     const Index begin = take_block(size_class);
@@ -154,11 +190,11 @@ void VoxelMap::add_voxel(const Eigen::Vector3f& point, const VoxelCoordinates& c
     block.begin = begin;
     block.size_class = static_cast<std::uint8_t>(size_class);
   }
-  const Index voxel = block.begin + cell_bits::rank(masks_[cell], bit);
+  const Index voxel = block.begin + cell_bits::rank(block.mask, bit);
   for (Index i = block.begin + block.count; i > voxel; --i) copy_voxel(i - 1, i);
   surface_[voxel] = {point, 0.0F};
   counts_[voxel] = {1, 0, 0};
-  masks_[cell] |= bit;
+  block.mask |= bit;
   ++block.count;
 }
 
@@ -170,8 +206,7 @@ VoxelMap::Index VoxelMap::find_or_add_brick(const VoxelCoordinates& coordinates)
     near_.push_back(0);
     const std::size_t size = kPlaces * near_.size();
     nearby_.resize(size);
-    masks_.resize(size);
-    blocks_.resize(size);
+    cells_.resize(size);
   } else {
     unused_bricks_.pop_back();
   }
@@ -239,18 +274,26 @@ void VoxelMap::follow_ray(const Eigen::Vector3d& sensor, const Eigen::Vector3d& 
   // Up to shortly before the return: noise of the range must not make a wall's own returns pass through it.
   const double pass_end_m = length_m - 2.0 * parameters_.voxel_size;
   const GridRay by_voxel(sensor, direction, parameters_.voxel_size);
-  BrickCursor cursor;
+  VoxelCoordinates first = VoxelCoordinates::Constant(1 << 30);  // cell of the brick, far off before there is one
+  Index brick = kNone;
+  std::uint64_t near = 0;
   const auto pass_cell = [&](const VoxelCoordinates& cell, double from_m, double to_m) {
-    const Index brick = find_brick(brick_of(cell), cursor);
-    if (brick == kNone) return true;
-    const Index place = kPlaces * brick + cell_bits::place_of(cell);
-    if (masks_[place] == 0) return true;
+    if (!is_in_brick(cell, first)) {
+      const VoxelCoordinates at = brick_of(cell);
+      first = kBrickCells * at;
+      brick = find_brick(at);
+      near = brick == kNone ? 0 : near_[brick];
+    }
+    const Index place_in_brick = cell_bits::place_of(cell);
+    if ((near >> place_in_brick & 1U) == 0) return true;
+    const Index place = kPlaces * brick + place_in_brick;
+    if (cells_[place].mask == 0) return true;
     by_voxel.walk(from_m, to_m, [&](const VoxelCoordinates& coordinates, double, double) {
       Index voxel = kNone;
       if (cell_of(coordinates) != cell) {
         voxel = find_voxel(coordinates);  // on the border rounding may lead into the next cell
-      } else if (const std::uint64_t bit = cell_bits::bit_of(coordinates); (masks_[place] & bit) != 0) {
-        voxel = blocks_[place].begin + cell_bits::rank(masks_[place], bit);
+      } else {
+        voxel = find_voxel(place, cell_bits::bit_of(coordinates));
       }
       if (voxel != kNone && voxel != last && meets(voxel)) count_meeting(voxel, &Counts::passes);
       return true;
@@ -271,7 +314,7 @@ void VoxelMap::count_meeting(Index voxel, std::uint32_t Counts::*kind) {
 
 template <class Visit>
 void VoxelMap::for_each_voxel(Visit&& visit) const {
-  for (const Block& block : blocks_) {
+  for (const Cell& block : cells_) {
     for (Index voxel = block.begin; voxel != block.begin + block.count; ++voxel) visit(voxel);
   }
 }
@@ -284,9 +327,9 @@ std::size_t VoxelMap::drop_beyond(const Eigen::Vector3d& center, double distance
   bounds_.setEmpty();
   brick_index_.for_each([&](KeyIndex::Key key, Index brick) {
     for (Index place = 0; place < kPlaces; ++place) {
-      std::uint64_t& mask = masks_[kPlaces * brick + place];
+      Cell& block = cells_[kPlaces * brick + place];
+      std::uint64_t& mask = block.mask;
       if (mask == 0) continue;
-      Block& block = blocks_[kPlaces * brick + place];
       Index kept = block.begin;
       Index voxel = block.begin;
       for (std::uint64_t rest = mask; rest != 0; rest &= rest - 1, ++voxel) {
@@ -356,9 +399,9 @@ std::size_t VoxelMap::find_nearby(Index index, const VoxelCoordinates& cell, con
     Index& brick = bricks[place / kPlaces];
     if (brick == kNone) brick = find_brick(brick_of({cell.x() + x - 1, cell.y() + y - 1, cell.z() + z - 1}));
     const Index other = kPlaces * brick + place % kPlaces;
-    const std::uint64_t mask = masks_[other];
+    const std::uint64_t mask = cells_[other].mask;
     const std::uint64_t wanted = mask & slabs[0][x] & slabs[1][y] & slabs[2][z];
-    const Index begin = blocks_[other].begin;
+    const Index begin = cells_[other].begin;
     __builtin_prefetch(&surface_[begin]);
     // Written down in any case, and the next one over it where nothing is wanted: that is quicker than to jump.
     found[count] = {begin, mask, wanted};
@@ -369,9 +412,7 @@ std::size_t VoxelMap::find_nearby(Index index, const VoxelCoordinates& cell, con
 
 VoxelMap::Index VoxelMap::find_voxel(const VoxelCoordinates& voxel) const {
   const Index cell = find_cell(cell_of(voxel));
-  const std::uint64_t bit = cell_bits::bit_of(voxel);
-  if (cell == kNone || (masks_[cell] & bit) == 0) return kNone;
-  return blocks_[cell].begin + cell_bits::rank(masks_[cell], bit);
+  return cell == kNone ? kNone : find_voxel(cell, cell_bits::bit_of(voxel));
 }
 
 PointCloud VoxelMap::points_within(const Eigen::Vector3d& center, double radius_m) const {
@@ -395,9 +436,8 @@ std::size_t VoxelMap::memory_bytes() const {
   std::size_t indices = unused_bricks_.capacity();
   for (const auto& unused : unused_blocks_) indices += unused.capacity();
   return brick_index_.memory_bytes() + observed_.memory_bytes() + near_.capacity() * sizeof(std::uint64_t) +
-         nearby_.capacity() * sizeof(std::uint32_t) + masks_.capacity() * sizeof(std::uint64_t) +
-         blocks_.capacity() * sizeof(Block) + surface_.capacity() * (sizeof(Surface) + sizeof(Counts)) +
-         indices * sizeof(Index);
+         nearby_.capacity() * sizeof(std::uint32_t) + cells_.capacity() * sizeof(Cell) +
+         surface_.capacity() * (sizeof(Surface) + sizeof(Counts)) + indices * sizeof(Index);
 }
 
 }  // namespace urban_gnss

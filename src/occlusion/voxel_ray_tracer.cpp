@@ -237,8 +237,7 @@ RayOutcome VoxelRayTracer::trace(const Eigen::Vector3d& origin, const Eigen::Vec
     const VoxelCoordinates first = VoxelMap::kBrickCells * coordinates;
     by_cell.walk(brick_from_m, brick_to_m, [&](const VoxelCoordinates& cell, double from_m, double to_m) {
       // On the border rounding may lead into the next brick, for less than a hair's breadth.
-      const VoxelCoordinates inside = cell - first;
-      if (((inside.x() | inside.y() | inside.z()) & ~(VoxelMap::kBrickCells - 1)) != 0) return true;
+      if (!VoxelMap::is_in_brick(cell, first)) return true;
       const VoxelMap::Index found = map_->find_cell(brick, cell);
       return found == VoxelMap::kNone || visit(found, cell, from_m, to_m);
     });

@@ -47,6 +47,8 @@ struct InsertReport {
   std::size_t dropped_by_limit{0};  ///< more than 0: max_voxels is too small for the window
 };
 
+struct PointBatch;
+
 /// A map of surfaces that grows scan by scan: for each voxel the mean of its points, the number of its returns, and how
 /// many of the followed rays ended there or passed it by. What was seen earlier stays until it is farther than the
 /// window.
@@ -111,6 +113,11 @@ class VoxelMap {
   }
   static VoxelCoordinates cell_of(const VoxelCoordinates& voxel) { return cell_bits::parent_of(voxel); }
   static VoxelCoordinates brick_of(const VoxelCoordinates& cell) { return cell_bits::parent_of(cell); }
+  /// Whether the cell is in the brick whose lowest cell is `first`.
+  static bool is_in_brick(const VoxelCoordinates& cell, const VoxelCoordinates& first) {
+    const VoxelCoordinates inside = cell - first;
+    return ((inside.x() | inside.y() | inside.z()) & ~(kBrickCells - 1)) == 0;
+  }
   /// Voxels of one cell, and those of them that are asked for.
   struct CellVoxels {
     Index begin;
@@ -136,8 +143,9 @@ class VoxelMap {
   static constexpr std::uint32_t kMinEvidence = 5;
   static constexpr std::size_t kSizeClasses = 5;  ///< room for 4, 8, 16, 32 or all 64 voxels of a cell
 
-  /// Where a cell's voxels are.
-  struct Block {
+  /// Which voxels of a cell hold points, and where they are.
+  struct Cell {
+    std::uint64_t mask{0};
     Index begin{0};
     std::uint8_t count{0};
     std::uint8_t size_class{0};  ///< only where count > 0
@@ -169,12 +177,17 @@ class VoxelMap {
     return cursor.brick;
   }
   void add_points_of(const PointCloud& points, InsertReport& report);
+  void add_batch(PointBatch& batch, BrickCursor& cursor, InsertReport& report);
   void add_to(Index voxel, const Eigen::Vector3f& point);
   void add_to_new_voxel(const Eigen::Vector3f& point, const VoxelCoordinates& voxel, InsertReport& report);
   void add_voxel(const Eigen::Vector3f& point, const VoxelCoordinates& voxel);
   void follow_ray(const Eigen::Vector3d& sensor, const Eigen::Vector3d& end);
   void count_meeting(Index voxel, std::uint32_t Counts::*kind);
   Index find_voxel(const VoxelCoordinates& voxel) const;
+  Index find_voxel(Index cell, std::uint64_t bit) const {
+    const auto& [mask, begin, count, size_class] = cells_[cell];
+    return (mask & bit) == 0 ? kNone : begin + cell_bits::rank(mask, bit);
+  }
   Index find_or_add_brick(const VoxelCoordinates& brick);
   Index occupy(const VoxelCoordinates& cell);
   void release(const VoxelCoordinates& cell);
@@ -194,8 +207,7 @@ class VoxelMap {
   std::vector<std::uint64_t> near_;  ///< each brick's mask of its cells with something in or beside them
   // The cells, kPlaces to a brick, by what is read together; those of an unused brick are all empty.
   std::vector<std::uint32_t> nearby_;  ///< which of the 27 cells about each hold voxels
-  std::vector<std::uint64_t> masks_;   ///< of the voxels of each
-  std::vector<Block> blocks_;
+  std::vector<Cell> cells_;
   std::vector<Index> unused_bricks_;
   std::vector<Surface> surface_;  ///< what a tracer reads
   std::vector<Counts> counts_;    ///< beside it
