@@ -14,8 +14,10 @@ import filecmp
 import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
+import tempfile
 import time
 
 import yaml
@@ -27,6 +29,7 @@ BEGIN = "<!-- written by dev/mutation_run.py --write -->"
 PACKAGE = "urban_gnss_localization"
 TEST_KINDS = ("gtest", "python", "rostest")
 KEPT = ("HOME", "TERM", "LANG", "URBAN_GNSS_DATA")
+GRACE_S = 30.0  # for an end after SIGINT
 KILLED, SURVIVED, NO_BUILD, BROKEN = "killed", "SURVIVED", "did not build", "fails without it"
 
 
@@ -94,15 +97,25 @@ class Copy:
     def run(self, command, where="."):
         """Exit code and output; None as code where it did not end in time."""
         shell = ["bash", "-c", '. scripts/environment.sh; cd "$1"; shift; exec "$@"', "bash", where] + command
-        process = subprocess.Popen(shell, cwd=self.folder, env=self.environment, stdout=subprocess.PIPE,
-                                   stderr=subprocess.STDOUT, universal_newlines=True, errors="replace",
-                                   start_new_session=True)
+        with tempfile.TemporaryFile("w+", errors="replace") as output:  # no pipe: nodes that are left would keep it open
+            process = subprocess.Popen(shell, cwd=self.folder, env=self.environment, stdout=output,
+                                       stderr=subprocess.STDOUT, start_new_session=True)
+            code = self.wait(process)
+            output.seek(0)
+            return code, output.read()
+
+    def wait(self, process):
+        """Its exit code; None where it was ended, because it took too long."""
         try:
-            output, _ = process.communicate(timeout=self.timeout_s)
-            return process.returncode, output
+            return process.wait(self.timeout_s)
         except subprocess.TimeoutExpired:
-            os.killpg(process.pid, 9)
-            return None, process.communicate()[0]
+            os.killpg(process.pid, signal.SIGINT)  # rostest ends its nodes
+        try:
+            process.wait(GRACE_S)
+        except subprocess.TimeoutExpired:
+            os.killpg(process.pid, signal.SIGKILL)
+            process.wait()
+        return None
 
     def configure(self):
         """Once."""

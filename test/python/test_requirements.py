@@ -4,6 +4,7 @@ callback asks the parameter server or waits, and the definitions of released mes
 import hashlib
 import os
 import re
+import signal
 import sys
 import unittest
 
@@ -103,6 +104,11 @@ class MutationRun(unittest.TestCase):
     def test_a_text_that_stands_twice_ends_the_run(self):
         with self.assertRaises(SystemExit):
             mutation_run.Change(Here(), self.mutation("package.xml", "depend"))
+
+    def test_a_command_ends_in_time_though_what_it_started_goes_on(self):
+        code, output = mutation_run.Copy(ROOT, 1, 5.0).run(["bash", "-c", "setsid sleep 60 & echo $!; sleep 60"])
+        self.assertIsNone(code)
+        os.kill(int(output), signal.SIGKILL)  # ProcessLookupError where it was waited for
 
     @staticmethod
     def mutation(file, text):

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 import unittest
 
@@ -126,6 +127,9 @@ class NodesTest(unittest.TestCase):
                                                stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
                                                universal_newlines=True)
             self.addCleanup(os.killpg, processes[node].pid, signal.SIGKILL)
+            too_late = threading.Timer(60.0, os.killpg, (processes[node].pid, signal.SIGKILL))
+            too_late.start()
+            self.addCleanup(too_late.cancel)
         for node, (_, awaited) in WAITING.items():
             with self.subTest(node=node):
                 self.assertTrue(any(awaited in line for line in processes[node].stdout), "it ended without a word")
