@@ -26,7 +26,14 @@ while [ $# -gt 0 ]; do
   esac
   shift
 done
-if [ ${#targets[@]} -eq 0 ]; then targets=($(ls "$root/test/fuzz/corpus")); fi
+known=($(ls "$root/test/fuzz/corpus"))
+if [ ${#targets[@]} -eq 0 ]; then targets=("${known[@]}"); fi
+for target in "${targets[@]}"; do
+  if [[ " ${known[*]} " != *" $target "* ]]; then
+    echo "fuzz.sh: no target $target; there are ${known[*]}" >&2
+    exit 2
+  fi
+done
 
 . "$root/scripts/environment.sh"
 mkdir -p "$build"
