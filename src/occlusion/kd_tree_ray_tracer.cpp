@@ -6,7 +6,7 @@
 
 #include <algorithm>
 
-#include "pcl_cloud.hpp"
+#include "pcd/pcl_cloud.hpp"
 
 namespace urban_gnss {
 

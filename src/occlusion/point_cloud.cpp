@@ -11,9 +11,9 @@
 #include <new>
 #include <stdexcept>
 
+#include "pcd/pcl_cloud.hpp"
 #include "pcd/pcl_pcd.hpp"
 #include "pcd_header.hpp"
-#include "pcl_cloud.hpp"
 #include "urban_gnss_localization/common/pending_file.hpp"
 #include "urban_gnss_localization/occlusion/cell_bits.hpp"
 #include "urban_gnss_localization/occlusion/key_index.hpp"

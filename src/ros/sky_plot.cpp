@@ -3,10 +3,10 @@
 #include <string>
 #include <utility>
 
+#include "messages/visibility_colours.hpp"
 #include "urban_gnss_localization/geometry/angles.hpp"
 #include "urban_gnss_localization/ros/pixel_canvas.hpp"
 #include "urban_gnss_localization/ros/visibility_messages.hpp"
-#include "visibility_colours.hpp"
 
 namespace urban_gnss {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <pcl/io/pcd_io.h>
 
-#include "../pcl_cloud.hpp"
+#include "pcl_cloud.hpp"
 
 extern "C" bool urban_gnss_read_pcd(const std::string& path, urban_gnss::PointCloud& cloud) {
   pcl::PointCloud<pcl::PointXYZ> points;

@@ -10,7 +10,7 @@
 #include <stdexcept>
 
 #include "urban_gnss_localization/ros/marker_parts.hpp"
-#include "../visibility_colours.hpp"
+#include "visibility_colours.hpp"
 
 namespace urban_gnss {
 namespace {
