@@ -29,8 +29,7 @@ from report_common import plt  # noqa: E402
 ESTIMATE = "odometry/filtered"
 RAW_FIX = "raw fix"
 
-COLOURS = {"ekf": "#e69f00", "gated_ekf": "#843c39", "complementary_ekf": "#d55e00", "ukf": "#7b4fd6",
-           "paper": "#0072b2", "imm_ekf": "#56b4e9", "switching": "#009e73", RAW_FIX: common.FIX_COLOUR}
+COLOURS = dict(common.METHOD_COLOURS, **{RAW_FIX: common.FIX_COLOUR})
 
 # What an information is worth: the method that does best without it.
 ABLATED = "imm_ekf"

@@ -9,6 +9,7 @@ names. Runs are named <bag>/<topic>. Writes overview.png, trajectory_<run>.png a
 cdf.png and report.html into DIR. The page needs no other file, and no network.
 """
 
+import itertools
 import os
 import sys
 
@@ -32,7 +33,7 @@ OVERVIEW_LEAST_M = 0.1
 LONGEST_GAP_S = 5.0
 FIX_TOPICS = ("fix", "fix_weighted")
 USUAL_TOPICS = (("/odometry/filtered", ""), ("/gps/fix", ": raw fix"), ("/gps/fix_weighted", ": weighted fix"))
-TRACK_COLOURS = ("#0072b2", "#7b4fd6", "#56b4e9", "#8c510a", "#f781bf", "#1f3a93")  # none of a decision's
+TRACK_COLOURS = ("#0072b2", "#8c510a", "#56b4e9", "#f781bf", "#7b4fd6", "#1f3a93")  # none of a decision's
 USED = ("accepted", "inflated", "bias_compensated")  # decisions
 
 
@@ -78,12 +79,15 @@ def read_runs(directory, metrics, path):
 
 def run_colours(runs, tracks=()):
     """A colour for each run and track: that of a method of this name, or the next free one."""
-    free = iter(TRACK_COLOURS * (1 + (len(tracks) + len(runs)) // len(TRACK_COLOURS)))
     colours = {run.name: common.FIX_COLOUR for run in runs if run.is_fix}
-    for name in [run.name for run in runs] + list(tracks):
-        if name not in colours:
-            known = [part for part in name.split("/") if part in common.METHOD_COLOURS]
-            colours[name] = common.METHOD_COLOURS[known[0]] if known else next(free)
+    names = [run.name for run in runs] + list(tracks)
+    for name in names:
+        known = [part for part in name.split("/") if part in common.METHOD_COLOURS]
+        if known and name not in colours:
+            colours[name] = common.METHOD_COLOURS[known[0]]
+    unused = [colour for colour in TRACK_COLOURS if colour not in colours.values()] or TRACK_COLOURS
+    free = itertools.cycle(unused)
+    colours.update((name, next(free)) for name in names if name not in colours)
     return colours
 
 

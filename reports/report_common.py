@@ -28,7 +28,8 @@ FIX_COLOUR = "#c2a878"
 TARGET_COLOUR = "#d62728"
 SHADOW_COLOUR = "#e6e9f0"
 
-# The same method has the same colour in every figure of every report.
+# The same method has the same colour in every figure of every report. Those that stand beside each other differ for the
+# colour-blind, too.
 METHOD_COLOURS = {
     "paper": "#0072b2",
     "conventional": "#d55e00",
@@ -36,6 +37,9 @@ METHOD_COLOURS = {
     "switching": "#009e73",
     "imm_ekf": "#56b4e9",
     "ekf": "#e69f00",
+    "gated_ekf": "#882255",
+    "complementary_ekf": "#d55e00",
+    "ukf": "#8c510a",
     "dead_reckoning": "#8a8a8a",
     "oracle": "#7b4fd6",
     "soft": "#117733",
