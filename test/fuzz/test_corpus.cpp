@@ -7,6 +7,8 @@
 #include <fstream>
 #include <iterator>
 #include <random>
+#include <string>
+#include <tuple>
 
 #include "package_directory.hpp"
 #include "target.hpp"
@@ -14,7 +16,10 @@
 namespace urban_gnss::fuzz {
 namespace {
 
-constexpr int kCases = 2500;  // of a target; dev/fuzz.sh is for more, or --gtest_random_seed=2
+// Changes of a target's corpus: ten parts, of which the sanitizers get the first. More: dev/fuzz.sh, or
+// --gtest_random_seed=2.
+constexpr unsigned kParts = 10;
+constexpr int kCases = 250;
 
 const std::vector<std::string> kWords{"0",
                                       "-1",
@@ -98,20 +103,29 @@ class Mutator {
   std::mt19937 random_;
 };
 
-class Corpus : public testing::TestWithParam<Target> {};
+class Corpus : public testing::TestWithParam<std::tuple<Target, unsigned>> {};
 
 TEST_P(Corpus, IsReadOrRefused) {
-  const std::vector<std::string> corpus = read_corpus(GetParam().name);
+  const auto& [target, part] = GetParam();
+  const std::vector<std::string> corpus = read_corpus(target.name);
   ASSERT_FALSE(corpus.empty());
-  for (const std::string& bytes : corpus) EXPECT_NO_THROW(GetParam().run(bytes)) << bytes;
-  Mutator mutator(corpus, static_cast<unsigned>(testing::GTEST_FLAG(random_seed)));
+  if (part == 0) {
+    for (const std::string& bytes : corpus) EXPECT_NO_THROW(target.run(bytes)) << bytes;
+  }
+  Mutator mutator(corpus, kParts * static_cast<unsigned>(testing::GTEST_FLAG(random_seed)) + part);
   for (int i = 0; i < kCases; ++i) {
     const std::string bytes = mutator.draw();
-    ASSERT_NO_THROW(GetParam().run(bytes)) << bytes;
+    ASSERT_NO_THROW(target.run(bytes)) << bytes;
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(All, Corpus, testing::ValuesIn(targets()), [](const auto& each) { return each.param.name; });
+std::string name_of(const testing::TestParamInfo<std::tuple<Target, unsigned>>& info) {
+  const auto& [target, part] = info.param;
+  return target.name + (part == 0 ? std::string() : "_more" + std::to_string(part));
+}
+
+INSTANTIATE_TEST_SUITE_P(All, Corpus, testing::Combine(testing::ValuesIn(targets()), testing::Range(0U, kParts)),
+                         name_of);
 
 }  // namespace
 }  // namespace urban_gnss::fuzz
