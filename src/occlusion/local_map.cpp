@@ -49,7 +49,6 @@ ScanReport LocalMap::add_scan(const PointCloud& scan, const Eigen::Isometry3d& s
       if (report.alignment.is_accepted()) {
         sensor_in_map = report.alignment.pose;
         correction_ = sensor_in_map * sensor_in_base.inverse() * base_in_map.inverse();
-        if (bearing_rad) odometry_from_bearing_rad_ = wrap_angle(yaw_of(base_in_map) - *bearing_rad);
       }
     }
     note_placement(report.alignment, base_in_map);
@@ -69,10 +68,9 @@ void LocalMap::follow(std::optional<double> bearing_rad, const Eigen::Isometry3d
   }
   const double difference_rad = wrap_angle(yaw_of(base_in_map) - *bearing_rad);
   const double before_rad = odometry_from_bearing_rad_.value_or(difference_rad);
-  const double excess_rad = angle_difference(before_rad, difference_rad);
-  // What jumps away, as beside a car of steel, may come back in steps: it is measured from where it was followed last.
-  if (std::abs(excess_rad) > aligner_parameters_.max_correction_angle) return;
   odometry_from_bearing_rad_ = difference_rad;
+  const double excess_rad = angle_difference(before_rad, difference_rad);
+  if (std::abs(excess_rad) > aligner_parameters_.max_correction_angle) return;
   const Eigen::Translation3d place((correction_ * base_in_map).translation());
   correction_ = place * Eigen::AngleAxisd(excess_rad, Eigen::Vector3d::UnitZ()) * place.inverse() * correction_;
 }

@@ -286,29 +286,6 @@ TEST(LocalMap, BearingThatJumpsIsNotFollowed) {
       << "the odometry's turn is taken, and the alignment undoes it";
 }
 
-TEST(LocalMap, BearingThatJumpsAwayAndCreepsBackTurnsNothing) {
-  LocalMapParameters blind;
-  blind.align = false;
-  LocalMap map(blind, {}, {});
-  Eigen::Isometry3d last;
-  for (const double bearing_rad : {2.0, 2.3, 2.2, 2.1, 2.0}) {
-    last = map.add_scan({{10, 0, 1}}, kSensor, pose(1, 2, 0, 0.5), bearing_rad).base_in_map;
-  }
-  expect_near(last, pose(1, 2, 0, 0.5), 1e-9, 1e-9);
-}
-
-TEST(LocalMap, BearingIsFollowedAgainFromAnAcceptedAlignmentOn) {
-  const auto walls = street();
-  LocalMap map({}, {}, {});
-  const auto add = [&](double x, double odometry_rad, double bearing_rad) {
-    return map.add_scan(scan_of(walls, pose(x, 0, 0, 0) * kSensor, 70), kSensor, pose(x, 0, 0, odometry_rad),
-                        bearing_rad);
-  };
-  add(0.0, 0.0, 1.2);
-  EXPECT_TRUE(add(1.5, 0.0, 2.7).alignment.is_accepted());  // not followed
-  EXPECT_LT(add(3.0, 0.1, 2.7).alignment.correction_rad, 0.03) << "the odometry's turn is not taken";
-}
-
 TEST(LocalMap, KeyframesAreAtDistancesAndTurns) {
   LocalMap map({}, {}, {});
   const auto is_keyframe = [&](double x, double yaw) {

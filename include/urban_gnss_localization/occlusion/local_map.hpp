@@ -60,8 +60,7 @@ struct ScanReport {
 ///
 /// Where an IMU tells the bearing, the guess turns as the bearing does and not as the odometry (section V: "odometry
 /// and IMU bearing as an initial guess"). A constant error of the bearing has no effect. Where both turn so differently
-/// that an alignment could not undo it (max_correction_angle), the odometry's turn is taken, until the bearing is back
-/// or an alignment is accepted without it.
+/// that an alignment could not undo it (max_correction_angle), the odometry's turn is taken.
 class LocalMap {
  public:
   /// Throws ParameterError.
@@ -96,8 +95,7 @@ class LocalMap {
   Eigen::Isometry3d correction_{Eigen::Isometry3d::Identity()};
   Eigen::Isometry3d last_keyframe_{Eigen::Isometry3d::Identity()};
   bool has_keyframe_{false};
-  std::optional<double>
-      odometry_from_bearing_rad_;  ///< the odometry's yaw minus the bearing, when it was followed last
+  std::optional<double> odometry_from_bearing_rad_;  ///< the odometry's yaw minus the bearing, at the last scan
   bool is_placed_{true};
   double unplaced_m_{0.0};  ///< travelled since the first keyframe that was not
 };
