@@ -41,7 +41,7 @@ TEST(StatusLine, WithoutAnEstimate) {
 TEST(StatusLine, WhileItWaitsWithFixesItDoesNotSayThatThereAreNone) {
   LocalizationReport report;
   report.reason = "waiting for the datum";
-  report.last_fix.stamp = from_seconds(12.0);
+  report.last_fix.stamp = urban_gnss::from_seconds(12.0);
   EXPECT_EQ(status_line(report), "WARN: waiting for the datum; fixes come, none was examined yet");
 }
 
