@@ -38,7 +38,8 @@ class ViewsTest(unittest.TestCase):
         defaults = {arg.get("name"): arg.get("default") for arg in launch.findall("arg")}
         self.assertEqual(set(defaults["localizers"].split()), set(localizers()))
         names = launch.find("node[@name='comparison']/param[@name='localizers']").get("value")
-        self.assertEqual(names, defaults["localizers"])
+        self.assertEqual(names, "$(arg known)")
+        self.assertEqual(launch.find("arg[@name='known']").get("value"), defaults["localizers"])
 
     def test_comparison_shows_each_in_its_colour(self):
         launch = ElementTree.fromstring(read_text("launch", "comparison.launch"))
