@@ -80,6 +80,9 @@ FILTERS = (
     ("the same: a correction", "BM_Correct/1", None, ()),
     ("`replay` of a drive of 400 s, with an output bag", "replay with a bag", DRIVE_S / 3000.0, ()),
     ("the same, without one", "replay", None, ()),
+    ("from a fix to its `odometry/filtered`, live, wall time: median", "fix to odometry", 0.3e-3,
+     (("of it, rospy's way to itself", "rospy"),)),
+    ("the same, 99 %", "fix to odometry, 99 %", 2e-3, (("of it, rospy's way to itself", "rospy, 99 %"),)),
 )
 TABLES = {"particles": PARTICLES, "occlusion": OCCLUSION, "filters": FILTERS}
 
@@ -97,17 +100,22 @@ def two_digits(ratio):
     return "{:.{}f}".format(ratio, 2 if ratio < 0.995 else 1 if ratio < 9.95 else 0)
 
 
+def benchmark_of(name):
+    """What is no Google Benchmark is named by its row."""
+    return "`{}`".format(name) if name.startswith("BM_") else ""
+
+
 def table_of(rows, results):
     """As lines of markdown: what is wanted and missed is said, and below it what a user would take instead."""
     lines = ["| Work | Median | Wanted | Benchmark |", "|---|---|---|---|"]
     for work, name, goal, others in rows:
         ours = results[name]["median_s"]
         wanted = "" if goal is None else in_words(goal) + ("" if ours <= goal else ", **missed**")
-        lines.append("| {} | {} | {} | {} |".format(work, in_words(ours), wanted,
-                                                    "`{}`".format(name) if name.startswith("BM_") else ""))
+        lines.append("| {} | {} | {} | {} |".format(work, in_words(ours), wanted, benchmark_of(name)))
         for label, other in others:
             theirs = results[other]["median_s"]
-            lines.append("| – {} | {}, × {} | | `{}` |".format(label, in_words(theirs), two_digits(theirs / ours), other))
+            lines.append("| – {} | {}, × {} | | {} |".format(label, in_words(theirs), two_digits(theirs / ours),
+                                                              benchmark_of(other)))
     return "\n".join(lines)
 
 
@@ -213,6 +221,16 @@ def run_occlusion_node(seconds=12):
     return {"occlusion_node": summary([1e-3 * float(re.search(r"node: ([\d.]+) ms a cloud", output)[1])])}
 
 
+def run_latency(seconds=60):
+    """From a fix to the estimate that has it, by dev/latency.py, and what rospy takes of it."""
+    output = output_of(sys.executable, os.path.join(campaign.ROOT, "dev", "latency.py"), "--seconds", "%d" % seconds)
+    results = {}
+    for name, label in (("fix to odometry", "localizer: fix and odometry"), ("rospy", "rospy alone")):
+        median, late = re.search(re.escape(label) + r" +([\d.]+) +([\d.]+)", output).groups()
+        results[name], results[name + ", 99 %"] = summary([1e-3 * float(median)]), summary([1e-3 * float(late)])
+    return results
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--repetitions", type=int, default=9)
@@ -229,7 +247,8 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         steps = [(program, lambda program=program: run_benchmarks(program, options, folder)) for program in PROGRAMS]
         if not options.only:
-            steps += [("replay", lambda: run_replay(options, folder)), ("occlusion_node", run_occlusion_node)]
+            steps += [("replay", lambda: run_replay(options, folder)), ("occlusion_node", run_occlusion_node),
+                      ("latency", run_latency)]
         for i, (name, step) in enumerate(steps):
             print("[%d/%d] %s" % (i + 1, len(steps), name), file=sys.stderr)
             results.update(step())
