@@ -467,7 +467,8 @@ def add_city(page, directory):
                                      for key in ("median", "p95", "max")))
     page.heading("A drive through a simulated city")
     page.image(CITY + "/overview.png", "The recommended localizer imm_ekf beside a plain EKF and the raw fix, on the same "
-               "odometry, IMU and receiver. With a map that can be zoomed: {}/report.html.".format(CITY))
+               "odometry, IMU and receiver.")
+    page.link(CITY + "/report.html", "The drive on a map that can be zoomed, with what became of each fix")
     page.table(("position error [m]", "median", "95 %", "max"), sorted(rows, key=lambda row: row[0] == "raw fix"))
     page.heading("The paper's field")
 

@@ -258,6 +258,10 @@ class HtmlPage:
         """A paragraph of plain text."""
         self._parts.append("<p>{}</p>".format(html.escape(text)))
 
+    def link(self, path, text):
+        """To another file, from where this page lies."""
+        self._parts.append('<p><a href="{}">{}</a></p>'.format(html.escape(path, quote=True), html.escape(text)))
+
     def table(self, header, rows, colours=None):
         """A table of strings; `colours` maps entries of the first column to the colour of their mark."""
         cells = "".join("<th>{}</th>".format(html.escape(name)) for name in header)

@@ -44,6 +44,9 @@ class PcdCheck {
     check_points();
     const auto begin = static_cast<std::uint64_t>(file_.tellg());
     rest_ = std::filesystem::file_size(path_) - begin;
+    check_end_of_header();
+    file_.clear();
+    file_.seekg(static_cast<std::streamoff>(begin));
     check_data(entries_["DATA"].front());
     return points_;
   }
@@ -53,9 +56,29 @@ class PcdCheck {
     throw std::runtime_error(path_ + ": is no .pcd file that can be read: " + what);
   }
 
+  static const std::set<std::string>& entry_names() {
+    static const std::set<std::string> names{"VERSION", "FIELDS", "COLUMNS",   "SIZE",   "TYPE", "COUNT",
+                                             "WIDTH",   "HEIGHT", "VIEWPOINT", "POINTS", "DATA"};
+    return names;
+  }
+
+  /// PCL reads on after DATA, until a line that is neither empty, a comment nor an entry: points that look like entries
+  /// would be taken for them, after memory was made for others.
+  void check_end_of_header() {
+    std::string line;
+    while (read_line(line) || !line.empty()) {
+      std::istringstream words(line);
+      std::string name;
+      words >> name;
+      for (const std::string& entry : entry_names()) {
+        if (name.compare(0, entry.size(), entry) == 0) fail("its points look like an entry " + entry);
+      }
+      if (!name.empty() && name.front() != '#') return;
+      line.clear();
+    }
+  }
+
   void read_entries() {
-    static const std::set<std::string> kNames{"VERSION", "FIELDS", "COLUMNS",   "SIZE",   "TYPE", "COUNT",
-                                              "WIDTH",   "HEIGHT", "VIEWPOINT", "POINTS", "DATA"};
     std::string line;
     while (entries_.count("DATA") == 0) {
       if (!read_line(line)) fail("its header has no entry DATA");
@@ -63,7 +86,7 @@ class PcdCheck {
       std::string name;
       words >> name;
       if (name.empty() || name.front() == '#') continue;
-      if (kNames.count(name) == 0) fail("its header has an unknown entry");
+      if (entry_names().count(name) == 0) fail("its header has an unknown entry");
       if (name == "COLUMNS") name = "FIELDS";
       std::vector<std::string> values{std::istream_iterator<std::string>(words), {}};
       if (!entries_.emplace(name, values).second) fail(name + " stands twice in its header");

@@ -36,6 +36,28 @@ TEST_F(MapFile, IsWrittenAndNotOverwrittenUnlessThatIsWanted) {
   EXPECT_EQ(files(), 1u) << "no remains";
 }
 
+// PCL goes on reading its header in the points: it read beyond them.
+TEST_F(MapFile, PointsThatLookLikeAHeaderAreRefused) {
+  const std::string header = "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 30\nPOINTS 30\nDATA binary\n";
+  const auto write = [&](std::string points) {
+    points.resize(360);
+    std::ofstream(in("a.pcd"), std::ios::binary) << header << points;
+  };
+  for (const char* points : {"SIZE 8 8 8\n", "# remark\n\n FIELDS x y\n", "POINTS"}) {
+    write(points);
+    try {
+      read_pcd(in("a.pcd"));
+      ADD_FAILURE() << points;
+    } catch (const std::runtime_error& error) {
+      EXPECT_THAT(error.what(), HasSubstr("a.pcd: is no .pcd file that can be read: its points look like an entry"));
+    }
+  }
+  for (const char* points : {"# \n", "\n\n", "points", "SIZ"}) {
+    write(points);
+    EXPECT_EQ(read_pcd(in("a.pcd")).size(), 30u) << points;
+  }
+}
+
 TEST_F(MapFile, OtherPathsAreRefused) {
   EXPECT_THAT(map_file_fault("map.pcd", false), HasSubstr("absolute"));
   EXPECT_THAT(map_file_fault("../map.pcd", false), HasSubstr("absolute"));

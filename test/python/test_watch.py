@@ -47,6 +47,16 @@ class WatchTest(unittest.TestCase):
         self.assertEqual(said.count("\033[A"), 2)
         self.assertNotIn("\033", self.say(True, ok, ok)[1])
 
+    def test_it_ends_with_who_reads_it(self):
+        """watch | head."""
+        class Closed(io.StringIO):
+            def write(self, text):
+                raise BrokenPipeError
+        one = watch.Watch(True, False)
+        with contextlib.redirect_stdout(Closed()):
+            one.take(array(("a: localization", 0, "x"), ("b: localization", 0, "y")))
+        self.assertFalse(one.is_read)
+
     def test_without_a_master(self):
         done = subprocess.run([PATH, "--seconds", "1"], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
                               universal_newlines=True, timeout=60,
