@@ -42,6 +42,8 @@ cmake -S "$root" -B "$build" -DCATKIN_DEVEL_PREFIX="$build/devel" -DCATKIN_ENABL
   -DCMAKE_CXX_COMPILER=clang++-14 -DCMAKE_BUILD_TYPE=Sanitize \
   -DCMAKE_CXX_FLAGS="-O1 -g1 -fno-omit-frame-pointer $flags -D_GLIBCXX_ASSERTIONS" > "$build.log"
 cmake --build "$build" --parallel "$(nproc)" --target fuzz >> "$build.log"
+# Its own libraries, not the plain ones that environment.sh names.
+export LD_LIBRARY_PATH="$build/devel/lib:$LD_LIBRARY_PATH"
 fuzz=$build/devel/lib/urban_gnss_localization/fuzz
 if [ ! -x "$fuzz" ]; then fuzz=$build/fuzz; fi
 
