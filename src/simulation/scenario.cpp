@@ -254,7 +254,7 @@ class ScenarioReader {
 
 Stamp parse_utc(const std::string& text) {
   static const std::regex format(R"((\d{4})-(\d{2})-(\d{2})T(\d{2}):(\d{2}):(\d{2})Z)");
-  const std::string fault = text + ": must be a time in UTC like 2026-05-04T09:30:00Z";
+  const std::string fault = text + ": must be a time in UTC like 2026-05-04T09:30:00Z, of 1980 to 2100";
   std::smatch match;
   if (!std::regex_match(text, match, format)) throw std::invalid_argument(fault);
   try {
@@ -264,7 +264,9 @@ Stamp parse_utc(const std::string& text) {
     const int hour = std::stoi(match[4]);
     const int minute = std::stoi(match[5]);
     const int second = std::stoi(match[6]);
-    if (hour > 23 || minute > 59 || second > 59 || date.year() < 1980) throw std::invalid_argument(fault);
+    if (hour > 23 || minute > 59 || second > 59 || date.year() < 1980 || date.year() > 2100) {
+      throw std::invalid_argument(fault);  // the stamps of ROS end in 2106
+    }
     const std::int64_t days = (date - boost::gregorian::date(1970, 1, 1)).days();
     return std::chrono::hours(24 * days + hour) + std::chrono::minutes(minute) + std::chrono::seconds(second);
   } catch (const std::out_of_range&) {  // no such day
