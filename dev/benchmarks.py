@@ -23,6 +23,9 @@ import time
 import campaign
 import fault_graph
 
+sys.path.append(os.path.join(campaign.ROOT, "reports"))
+import recordings  # noqa: E402
+
 PAGE = os.path.join(campaign.ROOT, "docs", "results", "benchmarks.md")
 STORED = os.path.join(campaign.ROOT, "docs", "results", "data", "benchmarks.json")
 PROGRAMS = ("particle_filter", "occlusion", "imm_ekf", "ukf", "complementary_ekf", "lidar")
@@ -130,10 +133,7 @@ def of_page(page, stored):
     parts = {name: table_of(rows, stored["results"]) for name, rows in TABLES.items()}
     parts["machine"] = "```sh\n{}\n```\n\n{}".format(stored["command"], machine_in_words(stored["machine"]))
     for name, text in parts.items():
-        marks = re.compile("(<!-- {0} -->\n).*?(<!-- /{0} -->)".format(name), re.DOTALL)
-        page, count = marks.subn(lambda found, text=text: found[1] + text + "\n" + found[2], page)
-        if count != 1:
-            sys.exit("benchmarks.py: {} marks of {} in {}".format(count, name, PAGE))
+        page = recordings.replace_between(page, name, text, PAGE)
     return page
 
 

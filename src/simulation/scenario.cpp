@@ -1,6 +1,5 @@
 #include "urban_gnss_localization/simulation/scenario.hpp"
 
-#include <algorithm>
 #include <boost/date_time/posix_time/posix_time.hpp>
 #include <cmath>
 #include <filesystem>
@@ -12,6 +11,7 @@
 #include "urban_gnss_localization/geometry/local_frame.hpp"
 #include "urban_gnss_localization/parameters/assignment.hpp"
 #include "urban_gnss_localization/parameters/parameter_reader.hpp"
+#include "urban_gnss_localization/parameters/yaml_files.hpp"
 #include "urban_gnss_localization/simulation/scenario_world.hpp"
 
 namespace urban_gnss {
@@ -274,25 +274,14 @@ Stamp parse_utc(const std::string& text) {
   }
 }
 
-namespace {
-
-/// Names of the scenarios beside a file that is not there.
-std::string names_beside(const std::filesystem::path& file) {
-  std::vector<std::string> names;
-  std::error_code error;
-  for (const auto& entry : std::filesystem::directory_iterator(file.parent_path(), error)) {
-    if (entry.path().extension() == ".yaml") names.push_back(entry.path().stem());
-  }
-  std::sort(names.begin(), names.end());
-  std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "; there are " : ", ") + name;
-  return text;
-}
-
-}  // namespace
-
 Scenario load_scenario(const std::string& file, const std::vector<std::string>& overrides) {
-  if (!std::filesystem::exists(file)) throw std::runtime_error(file + ": no such file" + names_beside(file));
+  if (!std::filesystem::exists(file)) {
+    std::string beside;
+    for (const std::string& name : yaml_files(std::filesystem::path(file).parent_path())) {
+      beside += (beside.empty() ? "; there are " : ", ") + name;
+    }
+    throw std::runtime_error(file + ": no such file" + beside);
+  }
   const YAML::Node root = load_map(file);
   if (root.size() == 0) throw std::runtime_error(file + ": must be a map of names to values");
   for (const std::string& text : overrides) assign(root, text);

@@ -3,13 +3,13 @@
 #include <ros/package.h>
 #include <yaml-cpp/yaml.h>
 
-#include <algorithm>
 #include <filesystem>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "urban_gnss_localization/parameters/assignment.hpp"
+#include "urban_gnss_localization/parameters/yaml_files.hpp"
 
 namespace urban_gnss {
 
@@ -26,15 +26,12 @@ inline std::filesystem::path find_scenario(const std::string& name) {
   namespace fs = std::filesystem;
   if (fs::is_regular_file(name)) return name;
   const fs::path package = package_path();
-  std::string known;
   for (const fs::path& candidate :
        {package / "scenarios" / (name + ".yaml"), package / "config" / name / "simulator.yaml"}) {
     if (fs::is_regular_file(candidate)) return candidate;
   }
-  std::vector<std::string> names;
-  for (const auto& entry : fs::directory_iterator(package / "scenarios")) names.push_back(entry.path().stem());
-  std::sort(names.begin(), names.end());
-  for (const std::string& other : names) known += ", " + other;
+  std::string known;
+  for (const std::string& other : yaml_files(package / "scenarios")) known += ", " + other;
   throw std::runtime_error(name + ": neither a file nor one of the scenarios paper_field" + known);
 }
 

@@ -10,6 +10,7 @@
 #include "overrides.hpp"
 #include "urban_gnss_localization/parameters/parameter_list.hpp"
 #include "urban_gnss_localization/parameters/params_file.hpp"
+#include "urban_gnss_localization/parameters/yaml_files.hpp"
 
 namespace urban_gnss {
 namespace {
@@ -60,7 +61,7 @@ std::string robot_file(const std::string& robot) {
   const fs::path file = folder / (robot + ".yaml");
   if (fs::is_regular_file(file)) return file;
   std::string known;
-  for (const auto& entry : fs::directory_iterator(folder)) known += " " + entry.path().stem().string();
+  for (const std::string& name : yaml_files(folder)) known += " " + name;
   throw std::runtime_error("--robot " + robot + ": must be one of" + known);
 }
 
