@@ -82,9 +82,8 @@ def missing(recording, kind, topic):
     what = "no messages on {}".format(topic) if topic else "no topic of the type {}".format(TYPES[kind])
     if kind in NEEDED:
         preset = receiver_argument(recording) if kind == "fix" else None
-        # A bag may have its odometry elsewhere (replay --odom none); a live graph does not work without it.
-        is_needed = recording.is_live or not recording.streams() or (kind == "fix" and preset is None)
-        finding = failed if is_needed else warned
+        # A bag may hold only a part of what the robot has; a live graph without it does not work.
+        finding = failed if recording.is_live or not recording.streams() else warned
         text = ("no fixes: {}; without them nothing is localized" if kind == "fix" else
                 "no odometry: {}; a localizer needs it, or replay --odom none").format(what)
         return finding(name, text,
