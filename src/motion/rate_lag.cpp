@@ -6,7 +6,6 @@
 namespace urban_gnss {
 namespace {
 
-constexpr int kLeastCount = 200;
 /// Rates of one second are about one observation.
 constexpr double kPerSecond = 10.0;
 constexpr double kEvidence = 8.0;
@@ -45,7 +44,7 @@ bool RateLagSearch::add(Stamp stamp, double odometry_radps, const RateAt& imu_at
 }
 
 std::optional<double> RateLagSearch::lead_s() const {
-  if (count_ < kLeastCount || !(odometry_square_ > 0.0)) return std::nullopt;
+  if (!has_turned_enough() || !(odometry_square_ > 0.0)) return std::nullopt;
   const auto correlation = [this](std::size_t i) {
     return imu_square_[i] > 0.0 ? product_[i] * product_[i] / (imu_square_[i] * odometry_square_) : 0.0;
   };

@@ -45,6 +45,7 @@ void LocalizationPipeline::add_odometry(const OdometrySample& message) {
 
   const Stamp since = history_.empty() ? sample.stamp : history_.latest();
   const double elapsed_s = to_seconds(sample.stamp - since);
+  yaw_rate_.set_comes_ahead(offsets_.offset_s(InputStream::kImu).value_or(0.0) > 0.0);
   Twist2 twist = yaw_rate_.twist_of(sample, since, events_);
   if (yaw_rate_.has_changed()) change_yaw_rate();
   speed_.set_wheels_contradicted(yaw_rate_.contradicts_wheels());

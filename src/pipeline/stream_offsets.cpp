@@ -23,7 +23,8 @@ double behind_s(InputStream stream) { return stream == InputStream::kImu ? kImuB
 
 const char* effect_of(InputStream stream, double offset_s) {
   if (stream == InputStream::kImu)
-    return offset_s < 0.0 ? "its yaw rate comes too late to be used" : "its clock is off, or the odometry comes late";
+    return offset_s < 0.0 ? "its yaw rate comes too late to be used"
+                          : "its clock is off, or the odometry comes late; it is not used until turns tell which";
   return offset_s < 0.0 ? "a slow receiver, or a clock that is off" : "their clock is off, or the odometry comes late";
 }
 

@@ -43,6 +43,7 @@ Twist2 YawRateSource::twist_of(const OdometrySample& step, Stamp since, std::vec
   has_changed_ = false;
   if (!parameters_.use_imu_yaw_rate) return twist;
   look_for_lead(step.stamp, twist.yaw_rate_radps, events);
+  if (comes_ahead_ && !lag_.has_turned_enough()) return twist;
   const Stamp lead = from_seconds(lead_s_);
   const std::optional<ImuYawRate> imu = mean_between(since + lead, step.stamp + lead, twist.yaw_rate_radps, events);
   const double duration_s = to_seconds(step.stamp - since);

@@ -116,6 +116,29 @@ TEST(YawRateSource, WhatWasTurnedByAnImuUpsideDownIsToldOnce) {
   EXPECT_EQ(rate, steps.odometry_radps);
 }
 
+TEST(YawRateSource, AnImuThatComesAheadIsUsedOnceItsClockIsKnown) {
+  for (const double lead_s : {3.0, 0.0}) {  // 0: only the odometry comes late
+    Steps steps;
+    const auto true_radps = [](double time_s) { return 0.3 * std::sin(0.4 * time_s) + 0.1 * std::sin(0.17 * time_s); };
+    const double bias_radps = 0.01;
+    for (double imu_s = 0.0; imu_s < 3.0; imu_s += 0.05) steps.imu(imu_s + lead_s, true_radps(imu_s) + bias_radps);
+    int used_at = 0;
+    for (int k = 1; k <= 600; ++k) {
+      for (const double ago_s : {0.05, 0.0}) {
+        const double imu_s = 3.0 + 0.1 * k - ago_s;
+        steps.imu(imu_s + lead_s, true_radps(imu_s) + bias_radps);
+      }
+      steps.odometry_radps = true_radps(steps.time + 0.05);
+      steps.source.set_comes_ahead(true);
+      const double rate = steps.step();
+      if (rate != steps.odometry_radps && used_at == 0) used_at = k;
+      EXPECT_NEAR(rate, steps.odometry_radps, 0.03) << lead_s << ' ' << k;
+    }
+    EXPECT_GT(used_at, 200) << lead_s;
+    EXPECT_LT(used_at, 500) << lead_s;
+  }
+}
+
 TEST(YawRateSource, WheelsThatTurnAloneAreContradicted) {
   YawRateSource source({true}, 2.0);
   std::vector<PipelineEvent> events;

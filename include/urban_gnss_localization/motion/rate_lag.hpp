@@ -21,10 +21,13 @@ class RateLagSearch {
 
   /// A rate of the odometry (rad/s); stamps ascend. Whether it adds to what lead_s() knows.
   bool add(Stamp stamp, double odometry_radps, const RateAt& imu_at);
+  /// Whether the robot has turned for long enough to tell: without a lead_s() the clocks agree.
+  bool has_turned_enough() const { return count_ >= kLeastCount; }
   /// s by which the IMU's stamps are ahead; nothing until it is clear that they are off.
   std::optional<double> lead_s() const;
 
  private:
+  static constexpr int kLeastCount = 200;
   static constexpr std::size_t kLags = 2 * kMostSteps + 1;
   struct Rate {
     Stamp stamp;

@@ -38,6 +38,9 @@ struct YawRateParameters {
 /// neighbours and from the wheels is left out and counted.
 ///
 /// Where both contradict each other grossly, the one that is not wrong by YawRateArbiter is used, with a doubt.
+///
+/// An IMU whose stamps come ahead of the odometry's tells of another moment: it is not used until the robot has turned
+/// for long enough to find by how much (RateLagSearch), or to find that only the odometry comes late.
 class YawRateSource {
  public:
   /// `silence_s`: without a yaw rate for longer than this, the IMU is silent. Requires parameters without faults.
@@ -48,6 +51,8 @@ class YawRateSource {
   void add(const ImuYawRate& rate);
   /// The same of an IMU that tells nothing but its yaw rate.
   void add(Stamp stamp, double yaw_rate_radps) { add({stamp, yaw_rate_radps, {}, std::abs(yaw_rate_radps)}); }
+  /// Whether the IMU's stamps are ahead as they come (StreamOffsets).
+  void set_comes_ahead(bool comes_ahead) { comes_ahead_ = comes_ahead; }
   /// s by which the IMU's stamps are ahead of the odometry's, as it was found from the rates of both; 0 until then.
   double lead_s() const { return lead_s_; }
   /// How many rates were left out, of all until now.
@@ -100,6 +105,7 @@ class YawRateSource {
   double without_imu_s_{0.0};  ///< of odometry, since the IMU's last yaw rate
   RateLagSearch lag_;
   double lead_s_{0.0};
+  bool comes_ahead_{false};
   ImuMountingCheck mounting_;
   bool imu_is_doubted_{false};
   bool has_changed_{false};
