@@ -13,13 +13,17 @@ class BadSetup(Exception):
 
 
 def setup_of(content):
-    """The Setup of a params file that was read: a section for each node, or the parameters alone."""
+    """The Setup of a params file that was read, with a section for each node."""
     if content is None:
         return DEFAULTS
     if not isinstance(content, dict):
         raise BadSetup("is no map of parameters")
+    for name, values in content.items():
+        if not (isinstance(values, dict) or values is None or "/" in str(name)):
+            raise BadSetup("{0} stands outside of a section and is not read: write {1}: {{{0}: ...}}".format(
+                name, DEFAULTS.section))
     section = next((name for name in LOCALIZERS if isinstance(content.get(name), dict)), None)
-    values = content[section] if section else content
+    values = content[section] if section else {}
     changes = {"section": section or DEFAULTS.section}
     for name in ("map_frame", "odom_frame", "base_link_frame"):
         if name in values:

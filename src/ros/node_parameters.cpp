@@ -59,11 +59,11 @@ void finish_reading(const ros::NodeHandle& private_node, const ParameterReader& 
   if (!file.empty()) {
     const std::string path = private_node.getNamespace();
     try {
-      const auto found = look_through_params(YAML::LoadFile(file), path.substr(path.rfind('/') + 1));
-      for (const std::string& fault : found.faults) faults.push_back(file + ": " + fault);
-      if (!found.hint.empty()) ROS_WARN_STREAM(file << ": " << found.hint);
-    } catch (const YAML::Exception& error) {
-      faults.push_back(file + ": " + error.what());
+      const ParamsFile found = read_params_file(file, {path.substr(path.rfind('/') + 1)});
+      faults.insert(faults.end(), found.faults.begin(), found.faults.end());
+      if (!found.hint.empty()) ROS_WARN_STREAM(found.hint);
+    } catch (const std::exception& error) {
+      faults.push_back(error.what());
     }
   }
   if (!faults.empty()) throw ParameterError(private_node.getNamespace(), faults);

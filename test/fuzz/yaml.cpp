@@ -60,7 +60,7 @@ void read_scenario(const std::string& bytes) {
 void read_parameters(const std::string& bytes) {
   read_as_file(bytes, [](const std::string& path) {
     const YAML::Node map = load_map(path);
-    look_through_params(map, "imm_ekf");
+    look_through_params(map, {"imm_ekf"});
     const YAML::Node bias = map["gps_bias"];
     if (bias.IsDefined()) {
       BiasPipelineParameters parameters;

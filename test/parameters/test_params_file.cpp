@@ -6,11 +6,13 @@
 namespace urban_gnss {
 namespace {
 
-ParamsFileFindings look(const std::string& yaml) { return look_through_params(YAML::Load(yaml), "imm_ekf"); }
+ParamsFile look(const std::string& yaml, const std::vector<std::string>& nodes = {"imm_ekf"}) {
+  return look_through_params(YAML::Load(yaml), nodes);
+}
 
 TEST(ParamsFile, SectionsOfNodesAreFine) {
   for (const char* yaml : {"imm_ekf: {direct_sigma: 4}", "{imm_ekf: {direct_sigma: 4}, ukf: {expert: {}}}",
-                           "/imm_ekf/direct_sigma: 4", "/robot1: {imm_ekf: {direct_sigma: 4}}"}) {
+                           "imm_ekf:", "/imm_ekf/direct_sigma: 4", "/robot1: {imm_ekf: {direct_sigma: 4}}"}) {
     const auto found = look(yaml);
     EXPECT_TRUE(found.faults.empty()) << yaml << ": " << found.faults[0];
     EXPECT_EQ(found.hint, "") << yaml;
@@ -24,6 +26,7 @@ TEST(ParamsFile, WhatNobodyReadsIsRefused) {
       {"{imm_efk: {direct_sigma: 4}, ukf: {}}", "section imm_efk is not read; did you mean imm_ekf?"},
       {"{imm_ekf: {direct_sigma: 4}, publish_tf: false}", "publish_tf stands outside"},
       {"expert: {imu: {use_imu_yaw_rate: false}}", "expert stands outside"},
+      {"imm_ekf: [4]", "imm_ekf must be a map"},
       {"[1, 2]", "must be a map"},
       {"", "must be a map"}};
   for (const auto& [yaml, fault] : cases) {
@@ -32,6 +35,17 @@ TEST(ParamsFile, WhatNobodyReadsIsRefused) {
     EXPECT_NE(found.faults[0].find(fault), std::string::npos) << found.faults[0];
   }
   EXPECT_EQ(look("{direct_sigma: 4, antenna_offset: [0.1, 0]}").faults.size(), 2u);
+}
+
+TEST(ParamsFile, OfSeveralNodesOneSectionIsEnough) {
+  const std::vector<std::string> nodes{"imm_ekf", "gps_bias"};
+  EXPECT_EQ(look("gps_bias: {mode: paper}", nodes).hint, "");
+  EXPECT_NE(look("ukf: {}", nodes).hint, "");
+  EXPECT_FALSE(holds_section(YAML::Load("imm_ekf: {expert: {gps_bias: {bias_timeout: 1}}}"), "gps_bias"));
+  EXPECT_EQ(look("{imm_ekf: {}, gps_bais: {}}", nodes).faults,
+            std::vector<std::string>{"section gps_bais is not read; did you mean gps_bias?"});
+  EXPECT_EQ(look("{imm_ekf: {}, mode: paper}", nodes).faults,
+            std::vector<std::string>{"mode stands outside of a section and is not read: write imm_ekf: {mode: ...}"});
 }
 
 TEST(ParamsFile, OneThatIsOfOtherNodesIsAHint) {

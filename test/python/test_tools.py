@@ -188,6 +188,27 @@ class ToolTest(unittest.TestCase):
         self.assertNotIn("no section", self.succeed("replay", self.path("in.bag"), "--localizer", "ukf", "--params",
                                                     self.path("p.yaml")))
 
+    def test_replay_refuses_a_file_that_the_node_refuses(self):
+        write_recording(self.directory)
+        self.succeed("csv_to_bag", self.directory, self.path("in.bag"))
+        with open(self.path("p.yaml"), "w") as file:
+            file.write("imm_ekf: {expert: {gps_bias: {bias_timeout: 1.0}}}\nukf: {mode: paper}\n")
+        self.succeed("replay", self.path("in.bag"), "--params", self.path("p.yaml"))
+        for content, faults in (
+                ("direct_sigma: 8.0\nimm_ekf: {}\n",
+                 ["p.yaml: direct_sigma stands outside of a section and is not read: write imm_ekf: {direct_sigma: ...}"]),
+                ("imm_efk: {direct_sigma: 8.0}\n", ["p.yaml: section imm_efk is not read; did you mean imm_ekf?"]),
+                ("imm_ekf_node: {}\n", ["section imm_ekf_node is not read: the node is called imm_ekf"]),
+                ("robot1: {imm_ekf: {direct_sigma: 8.0}}\n", ["section imm_ekf stands in a namespace"]),
+                ("ukf: {mode: paper}\nimm_ekf: {direct_sigma: eight, antena_offset: [0, 0]}\n",
+                 ["2 bad parameters", "direct_sigma = eight: must be a number",
+                  "antena_offset: no such parameter; did you mean antenna_offset?"])):
+            with open(self.path("p.yaml"), "w") as file:
+                file.write(content)
+            said = self.refuse("replay", self.path("in.bag"), "--params", self.path("p.yaml"))
+            for fault in faults:
+                self.assertIn(fault, said)
+
     def test_replay_as_printed(self):
         """The bias filter of `literal` runs on the fix itself: r-hat is then the distance from the datum."""
         write_recording(self.directory)

@@ -12,6 +12,7 @@ import unittest
 import rosbag
 import rospy
 import rostest
+import yaml
 from sensor_msgs.msg import NavSatFix, NavSatStatus
 from std_srvs.srv import Empty
 from urban_gnss_localization.msg import FixDecision, GpsBias
@@ -117,7 +118,8 @@ class GraphTest(unittest.TestCase):
                 for index, (topic, message) in enumerate(self.drive.messages):
                     bag.write("/" + topic, message, message.header.stamp + rospy.Duration(0, index))
             parameters = os.path.join(directory, "parameters.yaml")
-            subprocess.run(["rosparam", "dump", parameters, "/offline"], check=True)
+            with open(parameters, "w", encoding="utf-8") as file:
+                yaml.safe_dump({"particle_filter": rospy.get_param("/offline")}, file)
             subprocess.run(["rosrun", "urban_gnss_localization", "replay", source, "--localizer", "particle_filter",
                             "--params", parameters, "--output", result], check=True)
             with rosbag.Bag(result) as bag:

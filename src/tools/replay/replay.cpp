@@ -243,7 +243,8 @@ int replay_main(int argc, char** argv, const LocalizerRegistry& localizers) {
   app.add_option("--localizer", options.localizer,
                  localizers.names() + "; in comparisons also as " + localizers.variant_names());
   app.add_option("--robot", options.robot, "differential, ackermann, holonomic or car: what is known of its wheels");
-  app.add_option("--params", options.params, "YAML with the nodes' parameters; repeatable, later files win");
+  app.add_option("--params", options.params,
+                 "YAML with a section for each node, as for localization.launch; repeatable, later files win");
   line.add_set(
       "--set", options.overrides,
       "a parameter of the localizer, or after gps_bias. of the bias filter, after occlusion. of occlusion_node");

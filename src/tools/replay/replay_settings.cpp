@@ -24,34 +24,31 @@ struct Maps {
   YAML::Node of_localizer{YAML::NodeType::Map};
   YAML::Node of_gps_bias{YAML::NodeType::Map};
   YAML::Node of_occlusion{YAML::NodeType::Map};
+
+  std::vector<std::pair<std::string, YAML::Node>> by_node() const {
+    return {{entry, of_localizer}, {kGpsBias, of_gps_bias}, {kOcclusion, of_occlusion}};
+  }
 };
 
-/// Merges the sections of a file; returns what stands outside of them.
-YAML::Node merge_sections(const std::string& file, const LocalizerRegistry& localizers, Maps& maps) {
-  YAML::Node map = load_map(file);
-  std::vector<std::string> sections{kGpsBias, kOcclusion};
-  for (const LocalizerEntry& each : localizers.entries()) sections.push_back(each.name);
-  for (const std::string& section : sections) {
-    if (!map[section].IsDefined()) continue;
-    if (section == maps.entry) merge(maps.of_localizer, map[section]);
-    if (section == kGpsBias) merge(maps.of_gps_bias, map[section]);
-    if (section == kOcclusion) merge(maps.of_occlusion, map[section]);
-    map.remove(section);  // of another node
+/// Merges the sections that this run reads; those of other nodes are left out.
+void merge_sections(const YAML::Node& file, Maps& maps) {
+  for (const auto& [node, map] : maps.by_node()) {
+    if (file[node].IsDefined()) merge(map, file[node]);
   }
-  return map;
 }
 
-/// Says on standard error where a file has sections, but none that this run reads.
-void warn_of_other_sections(const std::string& file, const std::string& localizer) {
-  const YAML::Node map = load_map(file);
-  if (map.size() == 0 || map[kGpsBias].IsDefined() || map[kOcclusion].IsDefined()) return;
-  const std::string hint = look_through_params(map, localizer).hint;
-  if (!hint.empty()) std::cerr << file << ": " << hint << '\n';
-}
-
-void merge_file(const std::string& file, const LocalizerRegistry& localizers, Maps& maps) {
-  warn_of_other_sections(file, maps.entry);
-  merge(maps.of_localizer, merge_sections(file, localizers, maps));
+/// A file of --params. Adds to `faults` what of it nobody would read.
+void merge_params(const std::string& file, Maps& maps, std::vector<std::string>& faults) {
+  std::vector<std::string> nodes;
+  for (const auto& [node, map] : maps.by_node()) nodes.push_back(node);
+  const ParamsFile found = read_params_file(file, nodes);
+  faults.insert(faults.end(), found.faults.begin(), found.faults.end());
+  for (const std::string& node : nodes) {
+    if (found.sections[node].IsDefined() || !holds_section(found.sections, node)) continue;
+    faults.push_back(file + ": section " + node + " stands in a namespace: replay has none");
+  }
+  if (!found.hint.empty()) std::cerr << found.hint << '\n';
+  if (found.faults.empty()) merge_sections(found.sections, maps);
 }
 
 /// What is known of a kind of robot. Throws std::runtime_error that lists the kinds where there is none of this name.
@@ -116,9 +113,10 @@ ReplaySettings read_settings(const ReplayOptions& options, const LocalizerRegist
   ReplaySettings settings{LocalizerNodeSettings(*choice.entry), {}, {}};
   Maps maps{choice.entry->name};
   if (options.without_odometry) assign_without_odometry(settings.localizer, maps.of_localizer);
-  if (!options.robot.empty()) merge_sections(robot_file(options.robot), localizers, maps);
+  if (!options.robot.empty()) merge_sections(load_map(robot_file(options.robot)), maps);
   if (!options.occlusion_params.empty()) merge(maps.of_occlusion, load_map(options.occlusion_params));
-  for (const std::string& file : options.params) merge_file(file, localizers, maps);
+  std::vector<std::string> faults;
+  for (const std::string& file : options.params) merge_params(file, maps, faults);
   for (const std::string& text : choice.assignments) assign(maps.of_localizer, text);
   if (options.wants_imu) assign(maps.of_localizer, "expert.imu.use_imu_yaw_rate=true");
   for (const std::string& text : options.overrides) assign_option(text, maps);
@@ -132,7 +130,8 @@ ReplaySettings read_settings(const ReplayOptions& options, const LocalizerRegist
   for (YAML::Node map : {maps.of_localizer, maps.of_gps_bias}) map.remove("diagnostic_period");
   maps.of_localizer.remove(kStateFile);
 
-  std::vector<std::string> faults = read_tiered(maps.of_localizer, "", settings.localizer);
+  const auto of_localizer = read_tiered(maps.of_localizer, "", settings.localizer);
+  faults.insert(faults.end(), of_localizer.begin(), of_localizer.end());
   // What both nodes are told alike is told once: to the localizer.
   settings.gps_bias.frames = settings.localizer.shell.frames;
   read_tiered(maps.of_localizer, "", settings.gps_bias.bias);  // its faults are those of the localizer

@@ -58,8 +58,8 @@ struct ReplaySettings {
 };
 
 /// Reads the files of --params in their order, later values over earlier ones, then --set and the other options. A file
-/// holds the localizer's parameters, or a section for each node, as localization.launch takes them (`imm_ekf:`,
-/// `gps_bias:`, `occlusion:`). Throws std::runtime_error, ParameterError where a name or a value is not known.
+/// has a section for each node, as localization.launch takes it (`imm_ekf:`, `gps_bias:`, `occlusion:`). Throws
+/// std::runtime_error, ParameterError where a name or a value is not known.
 ReplaySettings read_settings(const ReplayOptions& options, const LocalizerRegistry& localizers);
 
 }  // namespace urban_gnss
