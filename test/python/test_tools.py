@@ -209,6 +209,21 @@ class ToolTest(unittest.TestCase):
             for fault in faults:
                 self.assertIn(fault, said)
 
+    def test_replay_with_a_wrong_topic_names_those_of_the_right_type(self):
+        write_recording(self.directory)
+        self.succeed("csv_to_bag", self.directory, self.path("in.bag"))
+        with rosbag.Bag(self.path("no_odom.bag"), "w") as out, rosbag.Bag(self.path("in.bag")) as bag:
+            for topic, message, time in bag.read_messages():
+                if topic != "/odom":
+                    out.write(topic, message, time)
+        said = self.refuse("replay", self.path("in.bag"), "--fix-topic", "gps/fx")
+        self.assertIn("(--fix-topic); did you mean /gps/fix?\nAll that it has:\n  /gps/datum", said)
+        self.assertIn("did you mean /odom?", self.refuse("replay", self.path("in.bag"), "--odom-topic", "wheels"))
+        self.assertIn("it has no geometry_msgs/TwistWithCovarianceStamped or geometry_msgs/TwistStamped\n",
+                      self.refuse("replay", self.path("in.bag"), "--velocity-topic", "v"))
+        self.assertIn("it has no nav_msgs/Odometry: --odom none makes the motion of what the receiver says",
+                      self.refuse("replay", self.path("no_odom.bag")))
+
     def test_replay_as_printed(self):
         """The bias filter of `literal` runs on the fix itself: r-hat is then the distance from the datum."""
         write_recording(self.directory)

@@ -17,6 +17,7 @@
 namespace urban_gnss {
 namespace {
 
+using ros::message_traits::DataType;
 using urban_gnss_localization::SatelliteArray;
 
 constexpr auto is_earlier = [](const auto& a, const auto& b) { return a.time < b.time; };
@@ -30,6 +31,20 @@ ReceiverRecording read_nmea_recording(const ReplayOptions& options) {
   ReceiverRecording recording = to_recording(log, options.nmea);
   if (recording.outputs.empty()) throw std::runtime_error(options.nmea + ": no solution in it can be used");
   return recording;
+}
+
+/// The topics of a bag that could be what was asked for: of a type in `types` ("a or b"), and no output of a localizer
+/// or simulator.
+std::string candidates(const BagReader& bag, const std::string& types) {
+  std::string found;
+  for (const BagConnection& each : bag.connections()) {
+    const std::string name = without_leading_slash(each.topic);
+    const bool is_output = name == topics::kDatum || name == topics::kFilteredFix || name == topics::kEstimate ||
+                           name == topics::kTruth || !why_not_a_receiver(each.topic).empty();
+    const bool is_of_type = (" " + types + " ").find(" " + each.type + " ") != std::string::npos;
+    if (is_of_type && !is_output && bag.count(name) > 0) found += " " + each.topic;
+  }
+  return found;
 }
 
 bool is_latched(const std::string& name) { return name == topics::kDatum || name == topics::kStaticTf; }
@@ -100,25 +115,31 @@ void ReplayInputs::read_topics() {
 void ReplayInputs::require_topics() const {
   const bool has_receiver = driver_ || recording_;
   std::map<std::string, std::string> option_of;
-  const auto require = [&](bool is_needed, const std::string& option, const std::string& name) {
+  const auto require = [&](bool is_needed, const std::string& option, const std::string& name, const std::string& types,
+                           const std::string& else_what = "") {
     const auto [other, is_first] = option_of.emplace(name, option);
     if (!is_first && !name.empty()) {
       throw std::runtime_error(other->second + " and " + option + " are the same topic, " + name);
     }
     if (!is_needed || bag_->count(name) > 0) return;
-    throw std::runtime_error(bag_->name() + " has no message on " + name + " (" + option + "); it has" +
-                             bag_->topics());
+    const std::string meant = candidates(*bag_, types);
+    throw std::runtime_error(bag_->name() + " has no message on " + name + " (" + option + "); " +
+                             (meant.empty() ? "it has no " + types + else_what : "did you mean" + meant + "?") +
+                             "\nAll that it has:" + bag_->topics());
   };
-  require(!has_receiver, "--fix-topic", topics_.fix);
-  require(!options_.without_odometry, "--odom-topic", topics_.odom);
-  require(options_.wants_imu && !options_.without_odometry, "--imu-topic", topics_.imu);
-  require(options_.wants_velocity && !has_receiver, "--velocity-topic", topics_.velocity);
-  require(options_.wants_satellites && !has_receiver, "--satellites-topic", topics_.satellites);
+  require(!has_receiver, "--fix-topic", topics_.fix, DataType<sensor_msgs::NavSatFix>::value());
+  require(!options_.without_odometry, "--odom-topic", topics_.odom, DataType<nav_msgs::Odometry>::value(),
+          ": --odom none makes the motion of what the receiver says");
+  require(options_.wants_imu && !options_.without_odometry, "--imu-topic", topics_.imu,
+          DataType<sensor_msgs::Imu>::value());
+  require(options_.wants_velocity && !has_receiver, "--velocity-topic", topics_.velocity, kVelocityTypes);
+  require(options_.wants_satellites && !has_receiver, "--satellites-topic", topics_.satellites,
+          DataType<SatelliteArray>::value());
 }
 
 /// Throws std::runtime_error, which names the point clouds that the bag has, where the one that is wanted has none.
 void ReplayInputs::require_clouds() const {
-  const std::string wanted = ros::message_traits::DataType<sensor_msgs::PointCloud2>::value();
+  const std::string wanted = DataType<sensor_msgs::PointCloud2>::value();
   std::string clouds;
   bool has_clouds = false;
   bool has_satellites = driver_ || recording_;
