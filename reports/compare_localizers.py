@@ -82,10 +82,13 @@ class Scores:
         return False
 
     def cell(self):
-        """median / 95 % / maximum as text."""
+        """median / 95 % / maximum as text; the maximum in whole metres, but never rounded to below the 95 %."""
         if not len(self.error):
             return "–"
-        text = "{:.1f} / {:.1f} / {:.0f}".format(self.percentile(50), self.percentile(95), self.percentile(100))
+        most = self.percentile(100)
+        p95 = "{:.1f}".format(self.percentile(95))
+        digits = 0 if float("{:.0f}".format(most)) >= float(p95) else 1
+        text = "{:.1f} / {} / {:.{}f}".format(self.percentile(50), p95, most, digits)
         return text + (" †" if self.has_diverged() else "")
 
 

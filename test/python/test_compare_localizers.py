@@ -51,6 +51,10 @@ class ScoresTest(unittest.TestCase):
         self.assertEqual(scores.cell(), "2.5 / 4.7 / 5")
         self.assertEqual(compare.Scores(np.array([]), np.array([])).cell(), "–")
 
+    def test_the_maximum_is_never_rounded_to_below_the_95(self):
+        self.assertEqual(compare.Scores(np.arange(3.0), np.full(3, 2.24)).cell(), "2.2 / 2.2 / 2.2")
+        self.assertEqual(compare.Scores(np.arange(3.0), np.full(3, 2.6)).cell(), "2.6 / 2.6 / 3")
+
     def test_divergence_is_a_large_error_for_long(self):
         t = np.arange(0.0, 100.0)
         for seconds, diverged in ((29, False), (31, True)):
