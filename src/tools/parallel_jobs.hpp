@@ -19,7 +19,7 @@ namespace urban_gnss {
 inline void run_jobs(std::size_t total, int threads, const std::function<std::string(std::size_t)>& label,
                      const std::function<void(std::size_t, const std::function<void(double)>&)>& job) {
   constexpr std::size_t kSteps = 1000;
-  Progress progress(kSteps, "per mille");
+  Progress progress(kSteps);
   std::vector<double> shares(total, 0.0);
   std::atomic<std::size_t> next{0};
   std::mutex mutex;

@@ -181,7 +181,7 @@ void run(const Options& options, const InputFiles& inputs) {
   }
   SimulationStatistics statistics;
   std::vector<SimulationEvent> events;
-  Progress progress(1000, "per mille");
+  Progress progress(1000);
   const auto wall_start = std::chrono::steady_clock::now();
   const auto real_time_factor = [&] {
     const double wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - wall_start).count();

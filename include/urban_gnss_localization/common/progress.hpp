@@ -9,14 +9,17 @@ namespace urban_gnss {
 /// a log file.
 class Progress {
  public:
-  /// `total` > 0 pieces, named `unit` (e.g. "runs").
-  Progress(std::size_t total, std::string unit);
+  /// `total` > 0 pieces, named `unit` (e.g. "runs"); without a name they are shown in percent.
+  explicit Progress(std::size_t total, std::string unit = {});
 
   /// `done` pieces are finished; `detail` says what is at hand.
   void report(std::size_t done, const std::string& detail = {});
   void finish();
 
  private:
+  std::string count(std::size_t done) const;
+  std::string percent(std::size_t done) const;
+
   std::size_t total_;
   std::string unit_;
   bool is_terminal_;
