@@ -23,7 +23,7 @@ LocalizerNode::LocalizerNode(ros::NodeHandle& node, ros::NodeHandle& private_nod
       pipeline_(parameters.localization, std::move(localizer)),
       on_output_(std::move(on_output)),
       slew_(parameters.slew),
-      sensor_frames_(parameters.frames, parameters.wants_antenna_from_tf()),
+      sensor_frames_(parameters.frames, parameters.antenna_offset_from_tf, parameters.localization.input.antenna()),
       state_(private_node, parameters.frames, log_),
       diagnostics_(ros::NodeHandle(), private_node) {
   const std::string fused = why_not_a_receiver(node.resolveName(topics::kFix));

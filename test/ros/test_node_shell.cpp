@@ -78,7 +78,7 @@ TEST(NodeShell, NothingThatIsThrownEscapesAndItIsCounted) {
 }
 
 TEST(SensorFrames, AFixWithoutFrameDoesNotForgetTheAntennas) {
-  SensorFrames frames(Frames{}, true);
+  SensorFrames frames(Frames{}, true, Eigen::Vector2d::Zero());
   frames.observe_fix("gps");
   for (int i = 0; i < 100; ++i) frames.observe_fix("");
   EXPECT_TRUE(frames.take_events().empty());

@@ -26,7 +26,7 @@ struct Node {
 
   tf2::BufferCore tf;
   Rig rig{kGiven};
-  SensorFrames frames{Frames{}, true};
+  SensorFrames frames{Frames{}, true, Eigen::Vector2d::Zero()};
 };
 
 TEST(SensorFrames, TheLeverArmOfTheAntennaComesFromTf) {
@@ -55,6 +55,35 @@ TEST(SensorFrames, AMissingOneIsSaidOnce) {
   EXPECT_THAT(node.said(), testing::ElementsAre(HasSubstr("antenna at x 1 m")));
 }
 
+TEST(SensorFrames, AToldPlaceOfTheAntennaStaysAndOneThatIsElsewhereByTfIsSaidOnce) {
+  Node node;
+  node.put_antenna_at(1.0, 0.0);
+  node.frames = SensorFrames(Frames{}, true, {0.3, 0.0});
+  for (int k = 0; k < 3; ++k) {
+    node.frames.observe_fix("antenna");
+    node.frames.look_up(node.tf, node.rig.pipeline);
+    node.frames.complain();
+  }
+  EXPECT_THAT(node.said(),
+              testing::ElementsAre("antenna_offset is x 0.3 m, y 0 m, but by tf antenna is at x 1 m, y 0 m "
+                                   "in base_link: antenna_offset is taken"));
+  node.rig.run(0.0, 2.0);
+  ASSERT_FALSE(node.rig.fake->fixes.empty());
+  EXPECT_NEAR(node.rig.fake->fixes.front().antenna_in_body.x(), 0.0, 1e-6);  // the rig's parameter, not tf's
+}
+
+TEST(SensorFrames, AToldPlaceOfTheAntennaNeedsNoTf) {
+  for (const bool has_tf : {false, true}) {
+    Node node;
+    if (has_tf) node.put_antenna_at(1.04, 0.0);  // within what a tape measure tells
+    node.frames = SensorFrames(Frames{}, true, {1.0, 0.0});
+    for (int k = 0; k < 20; ++k) node.frames.observe_fix(has_tf ? "antenna" : "");
+    node.frames.look_up(node.tf, node.rig.pipeline);
+    node.frames.complain();
+    EXPECT_THAT(node.said(), testing::IsEmpty());
+  }
+}
+
 TEST(SensorFrames, FramesOfTheOdometryThatAreOthersAreSaidOnce) {
   Node node;
   for (int k = 0; k < 3; ++k) node.frames.observe_odometry("wheel_odom", "base_footprint");
@@ -74,7 +103,7 @@ TEST(SensorFrames, ALeadingSlashIsNoOtherFrame) {
 }
 
 TEST(SensorFrames, FixesWithoutAFrameAreSaidOnce) {
-  SensorFrames frames{Frames{}, true};
+  SensorFrames frames{Frames{}, true, Eigen::Vector2d::Zero()};
   for (int k = 0; k < 20; ++k) frames.observe_fix("");
   const std::vector<PipelineEvent> events = frames.take_events();
   ASSERT_EQ(events.size(), 1u);

@@ -40,9 +40,6 @@ struct LocalizerNodeParameters {
   SavedStateParameters state;
   LocalizationParameters localization;
 
-  /// Whether the antenna's place is looked up in tf.
-  bool wants_antenna_from_tf() const { return antenna_offset_from_tf && localization.input.antenna().norm() == 0.0; }
-
   void visit(ParameterVisitor& v) {
     v.include(frames);
     v.basic()("publish_tf", publish_tf, "whether map -> odom is broadcast; false where another localizer does");

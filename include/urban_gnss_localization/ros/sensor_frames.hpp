@@ -15,8 +15,11 @@ namespace urban_gnss {
 /// part of a name.
 class SensorFrames {
  public:
-  /// `wants_antenna`: the antenna's place is tf's. Requires frames without faults.
-  SensorFrames(Frames frames, bool wants_antenna) : frames_(std::move(frames)), wants_antenna_(wants_antenna) {}
+  /// `asks_for_antenna`: tf is asked where the antenna is. That is its place where `told_antenna` (m, in base_link, of
+  /// the parameters) is zero; else the told one stays, and one that is elsewhere by tf is said. Requires frames without
+  /// faults.
+  SensorFrames(Frames frames, bool asks_for_antenna, const Eigen::Vector2d& told_antenna)
+      : frames_(std::move(frames)), asks_for_antenna_(asks_for_antenna), told_antenna_(told_antenna) {}
 
   void observe_odometry(const std::string& frame, const std::string& child_frame);
   void observe_fix(const std::string& frame);
@@ -39,10 +42,13 @@ class SensorFrames {
     bool was_complained_of{false};
   };
   void observe(Sensor& sensor, const std::string& frame);
+  bool is_told() const { return told_antenna_.norm() > 0.0; }
+  void found_antenna(const Eigen::Vector2d& antenna, LocalizationPipeline& pipeline);
   void say(PipelineEvent::Level level, const std::string& text) { events_.push_back({level, text}); }
 
   Frames frames_;
-  bool wants_antenna_;
+  bool asks_for_antenna_;
+  Eigen::Vector2d told_antenna_;
   bool has_odometry_{false};
   Sensor antenna_;
   int fixes_without_frame_{0};

@@ -11,6 +11,14 @@ using Level = PipelineEvent::Level;
 namespace {
 
 constexpr int kPatience_fixes = 5;
+/// Between two places of one antenna, measured by hand.
+constexpr double kSamePlace_m = 0.05;
+
+std::string describe(const Eigen::Vector2d& place) {
+  std::ostringstream text;
+  text << "x " << place.x() << " m, y " << place.y() << " m";
+  return text.str();
+}
 
 }  // namespace
 
@@ -37,16 +45,26 @@ void SensorFrames::observe(Sensor& sensor, const std::string& frame) {
 }
 
 void SensorFrames::observe_fix(const std::string& frame) {
-  if (!wants_antenna_) return;
+  if (!asks_for_antenna_) return;
   observe(antenna_, without_leading_slash(frame));
   // A receiver_node does not know the frame of its first fixes, where the driver tells it in another message.
-  if (antenna_.frame.empty() && ++fixes_without_frame_ == kPatience_fixes) {
+  if (!is_told() && antenna_.frame.empty() && ++fixes_without_frame_ == kPatience_fixes) {
     say(Level::kWarn,
         "fixes have no frame_id: the antenna is taken to be at the base; set antenna_offset if it is elsewhere");
   }
 }
 
 void SensorFrames::observe_imu(const std::string& frame) { observe(imu_, without_leading_slash(frame)); }
+
+void SensorFrames::found_antenna(const Eigen::Vector2d& antenna, LocalizationPipeline& pipeline) {
+  if (!is_told()) {
+    pipeline.set_antenna_offset(antenna);
+    say(Level::kInfo, "antenna at " + describe(antenna) + " in " + frames_.base_link);
+  } else if ((antenna - told_antenna_).norm() > kSamePlace_m) {
+    say(Level::kWarn, "antenna_offset is " + describe(told_antenna_) + ", but by tf " + antenna_.frame + " is at " +
+                          describe(antenna) + " in " + frames_.base_link + ": antenna_offset is taken");
+  }
+}
 
 void SensorFrames::look_up(const tf2::BufferCore& tf, LocalizationPipeline& pipeline) {
   const auto found = [&](Sensor& sensor) {
@@ -56,10 +74,7 @@ void SensorFrames::look_up(const tf2::BufferCore& tf, LocalizationPipeline& pipe
   };
   if (found(antenna_)) {
     const auto offset = tf.lookupTransform(frames_.base_link, antenna_.frame, ros::Time(0)).transform.translation;
-    pipeline.set_antenna_offset({offset.x, offset.y});
-    std::ostringstream text;
-    text << "antenna at x " << offset.x << " m, y " << offset.y << " m in " << frames_.base_link;
-    say(Level::kInfo, text.str());
+    found_antenna({offset.x, offset.y}, pipeline);
   }
   if (found(imu_)) {
     const auto q = tf.lookupTransform(frames_.base_link, imu_.frame, ros::Time(0)).transform.rotation;
@@ -68,7 +83,7 @@ void SensorFrames::look_up(const tf2::BufferCore& tf, LocalizationPipeline& pipe
 }
 
 void SensorFrames::complain() {
-  if (antenna_.is_missing && !antenna_.was_complained_of) {
+  if (!is_told() && antenna_.is_missing && !antenna_.was_complained_of) {
     antenna_.was_complained_of = true;
     say(Level::kWarn, "no tf from " + frames_.base_link + " to the fix's frame " + antenna_.frame +
                           ": the antenna is taken to be at the base until there is one");

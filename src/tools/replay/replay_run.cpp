@@ -28,7 +28,7 @@ ReplayRun::ReplayRun(const ReplayOptions& options, const ReplaySettings& setting
     : shell_(settings.localizer.shell),
       pipeline_(shell_.localization, settings.localizer.localizer->make()),
       slew_(shell_.slew),
-      sensor_frames_(shell_.frames, shell_.wants_antenna_from_tf()),
+      sensor_frames_(shell_.frames, shell_.antenna_offset_from_tf, shell_.localization.input.antenna()),
       bias_responder_(settings.gps_bias.bias.bias),
       has_truth_(recording.truths > 0) {
   if (has_truth_) {
