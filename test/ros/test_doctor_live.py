@@ -11,6 +11,7 @@ import threading
 import unittest
 
 import rosbag
+import rosnode
 import rospy
 import rostest
 from nav_msgs.msg import Odometry
@@ -79,6 +80,21 @@ class DoctorLiveTest(unittest.TestCase):
             self.assertLess(rospy.Time.now(), deadline, "nobody records")
             rospy.sleep(0.1)
         return recorder
+
+    def test_a_watch_that_is_ended_is_not_registered_any_more(self):
+        def watchers():
+            return [name for name in rosnode.get_node_names() if name.startswith("/watch")]
+
+        for number in (signal.SIGTERM, signal.SIGINT):
+            watch = subprocess.Popen(["rosrun", "urban_gnss_localization", "watch"], stderr=subprocess.DEVNULL)
+            self.addCleanup(watch.kill)
+            deadline = rospy.Time.now() + rospy.Duration(30.0)
+            while not watchers():
+                self.assertLess(rospy.Time.now(), deadline, "watch does not come")
+                rospy.sleep(0.1)
+            watch.send_signal(number)
+            self.assertEqual(watch.wait(30.0), 2)  # nothing was said
+            self.assertEqual(watchers(), [])
 
     def test_live_and_recorded(self):
         recorder = self.start_recording()
