@@ -26,6 +26,7 @@ PREFERRED_PANELS = ("paper", "switching", "conventional", "literal", "oracle")
 MAX_PANELS = 4
 VIEW_MARGIN_M = 12.0
 CITY = "city"
+LIVE = "live"
 SNAPSHOT_HALF_WIDTHS_M = (8.0, 16.0, 32.0)  # the first that shows most of a panel
 SHOWN_SHARE = 0.9  # of the particles
 MEDIAN_S = 0.5  # of figure 9
@@ -450,6 +451,12 @@ def metrics_of_city(directory):
     return os.path.join(directory, CITY, "metrics.json")
 
 
+def add_live_drive(page, directory):
+    """To the page of the drive of the nodes, where demo.sh has made one."""
+    if os.path.exists(os.path.join(directory, LIVE, "report.html")):
+        page.link(LIVE + "/report.html", "The same field, driven live by the nodes")
+
+
 def add_city(page, directory):
     """A drive through a simulated city, where demo.sh has made one: the first screen."""
     path = metrics_of_city(directory)
@@ -498,6 +505,7 @@ def make_report(directory):
         "A drive through a city, and t" if has_city else "T"), directory)
     add_city(page, directory)
     page.paragraph(introduction(metrics))
+    add_live_drive(page, directory)
     page.heading("Results")
     page.table(TABLE_HEADER, [table_row(name, method) for name, method in methods.items()], colours)
     page.paragraph("Errors over all seeds, those that diverged included. A seed has diverged when its "

@@ -57,7 +57,7 @@ img { max-width: 100%; height: auto; }
 STYLE = BASIC_STYLE + """
 table { display: block; overflow-x: auto; }
 th, td { padding: 0.3em 0.8em; border-bottom: 1px solid #ddd; text-align: right; white-space: nowrap; }
-th { border-bottom: 2px solid #888; vertical-align: bottom; }
+th { border-bottom: 2px solid #888; vertical-align: bottom; white-space: normal; min-width: 3.2em; }
 th:first-child, td:first-child { text-align: left; }
 .swatch { display: inline-block; width: 0.8em; height: 0.8em; margin-right: 0.5em; border-radius: 2px; }
 figure { margin: 1.5em 0; }

@@ -1,14 +1,14 @@
 #!/usr/bin/env bash
 # Builds the package and shows what it does: a drive through a simulated city with the recommended localizer beside a plain
-# EKF and the raw fix; the simulation of Nishida, Inoue and Sagara (2013) with all methods over many seeds; the same field
-# driven live by the nodes. Writes a report of each.
+# EKF and the raw fix; the field of Nishida, Inoue and Sagara (2013) driven live by the nodes; their simulation with all
+# methods over many seeds. Writes a report of each; the last leads to the other two.
 #
 #   scripts/demo.sh [--quick] [--seeds N] [--rviz] [--output DIR]
 #
 #   --quick       4 seeds and one live lap instead of 30 and three
 #   --seeds N     so many seeds
 #   --rviz        show the live part in rviz (where DISPLAY is set)
-#   --output DIR  folder of the results (default results/demo of this clone)
+#   --output DIR  folder of the results (default results/demo of this clone; with --quick results/demo_quick)
 #
 # The live part has a ROS master of its own on a free port; one that is running already is left alone.
 set -eo pipefail  # no -u: ROS's setup files read variables that are not set
@@ -28,7 +28,7 @@ wrong_usage() {
 quick=false
 seeds=
 rviz=false
-output=$root/results/demo
+output=
 while [ $# -gt 0 ]; do
   case $1 in
     --quick) quick=true ;;
@@ -42,6 +42,10 @@ while [ $# -gt 0 ]; do
 done
 live_laps=3
 if $quick; then live_laps=1; fi
+if [ -z "$output" ]; then
+  output=$root/results/demo
+  if $quick; then output+=_quick; fi
+fi
 if [ -z "$seeds" ]; then
   if $quick; then seeds=4; else seeds=30; fi
 fi
@@ -115,11 +119,6 @@ echo "== city: downtown_grid"
 run "$programs/evaluate" "$scratch/imm_ekf.bag" "$scratch/ekf.bag" --truth "$scratch/city.bag" --output "$output/city" \
   > "$scratch/city.txt"
 
-echo "== experiment: $seeds seeds"
-run "$programs/paper_experiment" --seeds "$seeds" --laps 3 --noise-scale 1e-6 --bias-direction random \
-  --methods paper,paper_ring_1,switching,imm_ekf,conventional,literal,dead_reckoning,oracle_zone,oracle \
-  --plots "$output" --json "$output/metrics.json"
-
 # Ends when the simulated time has come, or fails when the simulation does not go on.
 drive() {
   python3 - "$1" << 'END'
@@ -169,7 +168,12 @@ mv "$scratch/live.bag" "$output/live.bag"
 run "$programs/evaluate" "$output/live.bag" --estimate-topic odometry/filtered \
   --estimate-topic conventional/odometry/filtered --output "$output/live"
 
-echo "== the drive through the city: imm_ekf, a plain EKF, and the raw fix of each"
+echo "== experiment: $seeds seeds"
+run "$programs/paper_experiment" --seeds "$seeds" --laps 3 --noise-scale 1e-6 --bias-direction random \
+  --methods paper,paper_ring_1,switching,imm_ekf,conventional,literal,dead_reckoning,oracle_zone,oracle \
+  --plots "$output" --json "$output/metrics.json"
+
+echo "== the drive through the city: imm_ekf, ekf (a plain EKF), and the raw fix of each"
 grep -v '^report\|/report.html$' "$scratch/city.txt"
 echo "== done in $SECONDS s
 all         $output/report.html

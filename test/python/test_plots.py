@@ -37,6 +37,12 @@ def write_json(path, content):
         json.dump(content, stream)
 
 
+def write_text(path, text):
+    """Write the file."""
+    with open(path, "w", encoding="utf-8") as stream:
+        stream.write(text)
+
+
 def read_text(path):
     """The whole file."""
     with open(path, encoding="utf-8") as stream:
@@ -252,6 +258,15 @@ class PaperExperimentTest(ReportCase):
         self.assertIn("<td>\u2013</td>", page)
         self.assertIn("beyond it go: conventional.", page)
         self.assertNotIn("nan", without_pictures(page))
+
+    def test_page_leads_to_that_of_the_live_drive(self):
+        """Where there is one."""
+        self.assert_succeeds(self.SCRIPT)
+        self.assertNotIn("live/report.html", read_text(self.path("report.html")))
+        os.mkdir(self.path("live"))
+        write_text(self.path("live", "report.html"), "")
+        self.assert_succeeds(self.SCRIPT)
+        self.assertIn('<a href="live/report.html">', read_text(self.path("report.html")))
 
     def test_method_without_data_is_said(self):
         """A method of the metrics without a trajectory does not vanish silently."""
