@@ -303,8 +303,8 @@ def add_tables(page, runs, colours):
                + ("< 5 m [%]", "< 10 m [%]", "mean NEES"),
                [position_row(run) for run in runs], colours)
     page.paragraph("Coverage: share of the truth's samples that have an estimate. NEES: squared error in "
-                   "units of the estimate's own covariance; a consistent estimate has the number of its "
-                   "dimensions on average.")
+                   "units of the estimate's own covariance, of x, y and yaw: 3 is honest, more is an estimate that is "
+                   "worse than it claims.")
     page.heading("Heading errors [deg]")
     page.table(("run",) + STATISTIC_LABELS, [heading_row(run) for run in runs], colours)
 

@@ -473,8 +473,8 @@ def add_city(page, directory):
         rows.append((label,) + tuple(common.format_number(common.number(run, "position_m", key))
                                      for key in ("median", "p95", "max")))
     page.heading("A drive through a simulated city")
-    page.image(CITY + "/overview.png", "The recommended localizer imm_ekf beside a plain EKF and the raw fix, on the same "
-               "odometry, IMU and receiver.")
+    page.image(CITY + "/overview.png", "The recommended localizer imm_ekf beside ekf, a plain EKF that uses every fix "
+               "(complementary_ekf, mode: standard), and the raw fix, on the same odometry, IMU and receiver.")
     page.link(CITY + "/report.html", "The drive on a map that can be zoomed, with what became of each fix")
     page.table(("position error [m]", "median", "95 %", "max"), sorted(rows, key=lambda row: row[0] == "raw fix"))
     page.heading("The paper's field")

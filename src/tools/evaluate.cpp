@@ -296,7 +296,8 @@ void print_table(std::ostream& out, const std::vector<Run>& runs) {
     number(summary.share_below_10m, 7, 3);
     out << '\n';
   }
-  out << "errors in m; heading_deg is the heading's root mean square error; a consistent estimate has a NEES of 3\n";
+  out << "errors in m; heading_deg is the heading's root mean square error\n"
+         "NEES: squared error over the claimed covariance, of x, y and yaw; 3 is honest, more is worse than claimed\n";
 }
 
 /// "3 (longest 12.5 s, from 40.1 s)", counted from the begin.
