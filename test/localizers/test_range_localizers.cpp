@@ -174,13 +174,13 @@ TEST(RangeImmEkf, OddsOfABiasMatter) {
 struct ReceiverRig {
   SwitchingModelParameters parameters;
   FixStatistics statistics{parameters};
-  BiasGaussian before;
+  PoseEstimate before;
   double time_s{0.0};
 
   explicit ReceiverRig(const std::string& changes = "{}")
       : parameters(with(SwitchingModelParameters{}, changes)),
         statistics(parameters),
-        before(start_gaussian(pose_with_sigma({}, 5.0, 0.1), parameters)) {}
+        before(pose_with_sigma({}, 5.0, 0.1)) {}
 
   FixMeasurement fix(const Sky& sky = with_ranges(two_constellations(), {3.0, -2.0, 0.0})) {
     FixMeasurement fix = fix_of({0.0, 0.0}, 4.0, time_s += 1.0);
@@ -215,7 +215,7 @@ TEST(RangeFixStatistics, TakesTheRangesInPlaceOfTheFix) {
 TEST(RangeFixStatistics, TheAntennaAndNotTheBaseIsWhereRangesSay) {
   // What is known is the place of the antenna: 30 m from the base, and a reflection is judged by it.
   ReceiverRig rig;
-  rig.before = start_gaussian(pose_with_sigma({}, 1.0, 0.01), rig.parameters);
+  rig.before = pose_with_sigma({}, 1.0, 0.01);
   Sky sky = with_ranges(open_sky(), {30.0, 0.0, 0.0});
   sky[5].residual_m += 40.0;
   FixMeasurement fix = rig.fix(sky);

@@ -121,6 +121,17 @@ TEST(BiasModes, OddsOfABiasMultiplyThoseOfTheLongRun) {
   EXPECT_LT((often * often - lasting_transition(mode_transition(1.0, p, 9.0))).cwiseAbs().maxCoeff(), 1e-12);
 }
 
+/// A bias (m): Gaussian with the same variance (m^2) in x and y, independent.
+struct BiasState {
+  Eigen::Vector2d mean{Eigen::Vector2d::Zero()};
+  double variance{0.0};
+};
+BiasState predict_bias(const BiasState& bias, BiasMode from, BiasMode to, double elapsed_s,
+                       const BiasModeParameters& p) {
+  const BiasStep step = bias_steps(elapsed_s, p)[index_of(from)][index_of(to)];
+  return {step.left * bias.mean, step.left * step.left * bias.variance + step.growth_m2};
+}
+
 TEST(BiasModes, BiasOfEachContinuation) {
   BiasModeParameters p;
   p.slow_bias_walk = 0.5;

@@ -79,6 +79,9 @@ TEST(BiasQuad, MixesAsOne) {
   const auto weight_of = [&](std::size_t i) { return states.weights[i / 3][i % 3]; };
   const BiasGaussian expected = match_moments(9, state_of, weight_of);
   expect_same(mixture_of(states.quads, states.weights), expected, "all");
+  const PoseEstimate estimate = pose_estimate_of(states.quads, states.weights);
+  EXPECT_NEAR(angle_difference(estimate.pose.yaw, expected.mean[2]), 0.0, kTolerance);
+  EXPECT_LT((estimate.covariance - expected.covariance.topLeftCorner<3, 3>()).cwiseAbs().maxCoeff(), 100 * kTolerance);
   const Pose2 pose = pose_of(states.quads, states.weights);
   EXPECT_NEAR(pose.x, expected.mean[0], kTolerance);
   EXPECT_NEAR(pose.y, expected.mean[1], kTolerance);
@@ -92,7 +95,14 @@ TEST(BiasQuad, MixesAsOne) {
     shares[2][m] = 0.1;
   }
   BiasQuad mixed;
-  mix_qualities(states.quads, shares, mixed);
+  QualityNumbers weights = shares;
+  for (ModeNumbers& modes : weights) modes[0] *= 0.3;
+  for (ModeNumbers& modes : weights) modes[3] = 0.0;
+  const ModeNumbers sums = mix_qualities(states.quads, weights, 1, mixed);
+  EXPECT_NEAR(sums[0], 0.3, kTolerance);
+  EXPECT_NEAR(sums[1], 1.0, kTolerance);
+  EXPECT_EQ(sums[3], 0.0);
+  for (std::size_t level = 0; level < kQualityLevels; ++level) shares[level][3] = level == 1 ? 1.0 : 0.0;
   for (std::size_t m = 0; m < kContinuations; ++m) {
     expect_same(mixed.at(m),
                 match_moments(
@@ -117,15 +127,17 @@ TEST(BiasQuad, BiasesGoOnAsOne) {
   const States states(5);
   const BiasModeParameters p;
   const double elapsed_s = 0.7;
-  const std::array<ModeNumbers, kLastingModes> weights{
-      {{0.2, 0.1, 1.0, 0.0}, {0.5, 0.3, 0.0, 0.4}, {0.3, 0.6, 0.0, 0.6}}};
+  std::array<ModeNumbers, kLastingModes> weights{{{0.4, 0.1, 0.0, 0.0}, {1.0, 0.3, 0.0, 0.4}, {0.6, 0.6, 0.0, 0.6}}};
   BiasQuad after;
-  continue_biases(states.quads[1], weights, bias_steps(elapsed_s, p), after);
+  EXPECT_EQ(continue_biases(states.quads[1], weights, bias_steps(elapsed_s, p), after),
+            ModeNumbers({2.0, 1.0, 0.0, 1.0}));
+  for (ModeNumbers& modes : weights) modes[0] *= 0.5;
+  weights[0][2] = 1.0;
   for (std::size_t j = 0; j < kContinuations; ++j) {
     std::array<BiasGaussian, kLastingModes> parts;
     for (std::size_t m = 0; m < kLastingModes; ++m) {
       parts[m] = states.single[1][m];
-      continue_bias(parts[m], bias_step(kModes[m], kModes[j], elapsed_s, p));
+      continue_bias(parts[m], bias_steps(elapsed_s, p)[m][j]);
     }
     expect_same(after.at(j),
                 match_moments(
@@ -148,10 +160,12 @@ TEST(BiasQuad, TakesAFixAsOne) {
         fix.position = {far_m, -0.5 * far_m};
         const FixNoise noise{1.7, 2.5, 0.3, of_ranges};
         States states(6);
-        const BiasQuadUpdate update = take_fix(states.quads[0], fix, noise, p);
-        for (std::size_t m = 0; m < kContinuations; ++m) {
-          expect_same(update, m, take_fix(states.single[0][m], kModes[m], fix, noise, p));
-          expect_same(states.quads[0].at(m), states.single[0][m], "fix at " + std::to_string(far_m));
+        const BiasQuadUpdates updates = take_fix(states.quads, fix, noise, p);
+        for (std::size_t level = 0; level < kQualityLevels; ++level) {
+          for (std::size_t m = 0; m < kContinuations; ++m) {
+            expect_same(updates[level], m, take_fix(states.single[level][m], kModes[m], fix, noise, p));
+            expect_same(states.quads[level].at(m), states.single[level][m], "fix at " + std::to_string(far_m));
+          }
         }
       }
     }
@@ -165,23 +179,25 @@ TEST(BiasQuad, TakesAVelocityAsOne) {
   Eigen::Matrix2d noise;
   noise << 0.04, 0.01, 0.01, 0.09;
   States states(7);
-  const BiasQuadUpdate update = take_velocity(states.quads[2], measured, noise, 1.8, 1.5);
-  for (std::size_t m = 0; m < kContinuations; ++m) {
-    expect_same(update, m, take_velocity(states.single[2][m], measured, noise, 1.8, 1.5));
-    expect_same(states.quads[2].at(m), states.single[2][m], "velocity");
+  const BiasQuadUpdates updates = take_velocity(states.quads, measured, noise, 1.8, 1.5);
+  for (std::size_t level = 0; level < kQualityLevels; ++level) {
+    for (std::size_t m = 0; m < kContinuations; ++m) {
+      expect_same(updates[level], m, take_velocity(states.single[level][m], measured, noise, 1.8, 1.5));
+      expect_same(states.quads[level].at(m), states.single[level][m], "velocity");
+    }
   }
 }
 
 TEST(BiasQuad, TellsWhatIsNotFinite) {
   States states(8);
-  EXPECT_TRUE(states.quads[0].is_finite());
+  EXPECT_TRUE(are_finite(states.quads));
   for (const double bad : {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
-    BiasQuad mean = states.quads[0];
-    mean.mean[3][2] = bad;
-    EXPECT_FALSE(mean.is_finite());
-    BiasQuad covariance = states.quads[0];
-    covariance.covariance[BiasQuad::pair(7, 7)][3] = bad;
-    EXPECT_FALSE(covariance.is_finite());
+    BiasQuads mean = states.quads;
+    mean[0].mean[3][2] = bad;
+    EXPECT_FALSE(are_finite(mean));
+    BiasQuads covariance = states.quads;
+    covariance[2].covariance[BiasQuad::pair(7, 7)][3] = bad;
+    EXPECT_FALSE(are_finite(covariance));
   }
 }
 

@@ -92,9 +92,8 @@ TEST(ImmEkf, ProbabilitiesOfOneFixAreBayes) {
   double weight[kContinuations];
   double sum = 0.0;
   for (int j = 0; j < 4; ++j) {
-    const auto to = static_cast<BiasMode>(j);
-    const double variance =
-        own + (j == 0 ? 0.25 : 1.0) + predict_bias({}, BiasMode::kDirect, to, elapsed, p.modes).variance;
+    const BiasStep step = bias_steps(elapsed, p.modes)[index_of(BiasMode::kDirect)][static_cast<std::size_t>(j)];
+    const double variance = own + (j == 0 ? 0.25 : 1.0) + step.growth_m2;
     const double density = std::exp(-0.5 * 13.0 / variance) / (2.0 * kPi * variance);
     weight[j] = t(0, j) * ((1.0 - p.modes.outlier_share) * density + p.modes.outlier_density());
     sum += weight[j];

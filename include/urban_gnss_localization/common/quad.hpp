@@ -11,8 +11,9 @@
 namespace urban_gnss {
 
 /// Four numbers side by side, with the compiler's arithmetic and comparisons: an instruction each where the processor
-/// has vectors of 256 bits (URBAN_GNSS_VECTORISED), two else. All functions here work on each number for itself. No more
-/// than the stack's own alignment is asked for, as GCC 12 does not always give an array of them more (its bug 109780).
+/// has vectors of 256 bits (URBAN_GNSS_VECTORISED), two else. All functions here work on each number for itself. No
+/// more than the stack's own alignment is asked for, as GCC 12 does not always give an array of them more (its bug
+/// 109780).
 using Quad = double __attribute__((vector_size(32), aligned(16)));
 /// Bits of four numbers, or the four answers of a comparison.
 using QuadBits = std::int64_t __attribute__((vector_size(32), aligned(16)));
@@ -24,6 +25,7 @@ URBAN_GNSS_INLINE Quad load(const double* numbers) {
   return x;
 }
 URBAN_GNSS_INLINE void store(const Quad& x, double* numbers) { std::memcpy(numbers, &x, sizeof x); }
+URBAN_GNSS_INLINE double sum_of(const Quad& x) { return (x[0] + x[1]) + (x[2] + x[3]); }
 
 namespace quad_math {
 
@@ -46,11 +48,17 @@ inline constexpr int kMantissa = 52;
 /// The nearest integer of a number below 2^51.
 URBAN_GNSS_INLINE Quad round(const Quad& x) { return (x + kShift) - kShift; }
 
+/// Even and odd powers apart, so that they need not wait for each other.
 template <int kCount>
 URBAN_GNSS_INLINE Quad polynomial(const Quad& x, const double (&coefficients)[kCount]) {
-  Quad y = quad(coefficients[kCount - 1]);
-  for (int k = kCount - 2; k >= 0; --k) y = y * x + coefficients[k];
-  return y;
+  const Quad square = x * x;
+  Quad highest = quad(coefficients[kCount - 1]);
+  Quad next = quad(coefficients[kCount - 2]);
+  for (int k = kCount - 3; k >= 0; k -= 2) {
+    highest = highest * square + coefficients[k];
+    if (k > 0) next = next * square + coefficients[k - 1];
+  }
+  return kCount % 2 == 0 ? highest * x + next : next * x + highest;
 }
 
 /// (sin(x) - x) / x^3 for a square x^2 < 0.62.

@@ -59,12 +59,6 @@ void doubt(BiasGaussian& state, const MotionDoubt& doubt) {
   state.covariance(kYaw, kYaw) += doubt.heading_rad2;
 }
 
-BiasStep bias_step(BiasMode from, BiasMode to, double elapsed_s, const BiasModeParameters& p) {
-  const bool goes_on = from != BiasMode::kDirect && (to == BiasMode::kSlow || to == BiasMode::kFast);
-  if (goes_on) return {bias_fade(elapsed_s, p), bias_growth(to, elapsed_s, p)};
-  return {0.0, predict_bias({}, from, to, elapsed_s, p).variance};
-}
-
 void continue_bias(BiasGaussian& state, const BiasStep& step) {
   state.mean.tail<2>() *= step.left;
   state.covariance.rightCols<2>() *= step.left;

@@ -2,9 +2,10 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <unsupported/Eigen/MatrixFunctions>
 
+#include "urban_gnss_localization/common/quad.hpp"
 #include "urban_gnss_localization/geometry/angles.hpp"
 
 namespace urban_gnss {
@@ -38,16 +39,64 @@ Rates mode_rates(const BiasModeParameters& p, double bias_odds) {
   return rates;
 }
 
-void normalise_rows(Rates& probabilities) {
-  probabilities = probabilities.cwiseMax(0.0);
-  for (Eigen::Index row = 0; row < probabilities.rows(); ++row) probabilities.row(row) /= probabilities.row(row).sum();
+/// A matrix of the modes, by rows.
+struct ModeRows {
+  Quad rows[kContinuations];
+  URBAN_GNSS_INLINE Quad& operator[](std::size_t i) { return rows[i]; }
+  URBAN_GNSS_INLINE const Quad& operator[](std::size_t i) const { return rows[i]; }
+};
+
+URBAN_GNSS_INLINE ModeRows operator*(const ModeRows& a, const ModeRows& b) {
+  ModeRows product;
+  for (std::size_t i = 0; i < kContinuations; ++i) {
+    product[i] = (a[i][0] * b[0] + a[i][1] * b[1]) + (a[i][2] * b[2] + a[i][3] * b[3]);
+  }
+  return product;
+}
+/// a A + b B + c I.
+URBAN_GNSS_INLINE ModeRows sum(double a, const ModeRows& first, double b, const ModeRows& second, double c) {
+  ModeRows sum;
+  for (std::size_t i = 0; i < kContinuations; ++i) {
+    sum[i] = a * first[i] + b * second[i];
+    sum[i][static_cast<int>(i)] += c;
+  }
+  return sum;
+}
+URBAN_GNSS_INLINE void add(ModeRows& rows, const ModeRows& added) {
+  for (std::size_t i = 0; i < kContinuations; ++i) rows[i] += added[i];
+}
+URBAN_GNSS_INLINE void normalise(ModeRows& rows) {
+  for (Quad& row : rows.rows) row /= sum_of(row);
 }
 
-/// exp(rates t), whose rows are probabilities to rounding: they are made so exactly.
-Rates transition_of(const Rates& rates, double time_s) {
-  Rates result = (rates * time_s).exp();
-  normalise_rows(result);
-  return result;
+/// exp(rates t), whose rows are probabilities, by uniformization (Jensen 1953): the series of a matrix without a
+/// negative number, in which nothing cancels, for a short step, which is then doubled until it is t.
+URBAN_GNSS_VECTORISED Rates transition_of(const Rates& rates, double time_s) {
+  const double fastest = -rates.diagonal().minCoeff();
+  int doublings = 0;
+  std::frexp(16.0 * fastest * time_s, &doublings);  // until a step is at most 1/16 of the fastest mean time
+  doublings = std::max(doublings, 0);
+  const double step_s = std::ldexp(time_s, -doublings);
+  ModeRows one;
+  for (int i = 0; i < rates.rows(); ++i) {
+    for (int j = 0; j < rates.cols(); ++j) one[static_cast<std::size_t>(i)][j] = step_s * rates(i, j);
+    one[static_cast<std::size_t>(i)][i] += step_s * fastest;
+  }
+  // To the eighth power, beyond which nothing is left but rounding, by three powers (Paterson and Stockmeyer 1973).
+  const ModeRows two = one * one;
+  const ModeRows three = two * one;
+  ModeRows result = sum(1.0 / 40320.0, two, 1.0 / 5040.0, one, 1.0 / 720.0) * three;
+  add(result, sum(1.0 / 120.0, two, 1.0 / 24.0, one, 1.0 / 6.0));
+  result = result * three;
+  add(result, sum(0.5, two, 1.0, one, 1.0));
+  normalise(result);
+  for (; doublings > 0; --doublings) result = result * result;
+  normalise(result);
+  Rates probabilities;
+  for (int i = 0; i < rates.rows(); ++i) {
+    for (int j = 0; j < rates.cols(); ++j) probabilities(i, j) = result[static_cast<std::size_t>(i)][j];
+  }
+  return probabilities;
 }
 
 }  // namespace
@@ -66,31 +115,17 @@ ModeProbabilities stationary_modes(const BiasModeParameters& p, double bias_odds
   return {late(kS, kS), late(kS, kL) + late(kS, kJ), late(kS, kF)};
 }
 
-double bias_fade(double elapsed_s, const BiasModeParameters& p) {
-  return p.bias_fade_time > 0.0 ? std::exp(-elapsed_s / p.bias_fade_time) : 1.0;
-}
-
-double bias_growth(BiasMode to, double elapsed_s, const BiasModeParameters& p) {
-  if (to != BiasMode::kSlow && to != BiasMode::kFast) return 0.0;
-  const double walk = to == BiasMode::kSlow ? p.slow_bias_walk : p.fast_bias_walk;
-  const double fade = bias_fade(elapsed_s, p);
-  return walk * walk * elapsed_s + (1.0 - fade * fade) * p.jump_sigma * p.jump_sigma;
-}
-
-BiasState predict_bias(const BiasState& bias, BiasMode from, BiasMode to, double elapsed_s,
-                       const BiasModeParameters& p) {
-  BiasState predicted;
-  if (to == BiasMode::kDirect) return predicted;
-  if (to == BiasMode::kJump) {
-    predicted.variance = p.jump_sigma * p.jump_sigma;
-  } else if (from == BiasMode::kDirect) {
-    predicted.variance = p.onset_sigma * p.onset_sigma + bias_growth(to, elapsed_s, p);
-  } else {
-    const double fade = bias_fade(elapsed_s, p);
-    predicted.mean = fade * bias.mean;
-    predicted.variance = fade * fade * bias.variance + bias_growth(to, elapsed_s, p);
-  }
-  return predicted;
+BiasSteps bias_steps(double elapsed_s, const BiasModeParameters& p) {
+  const double left = p.bias_fade_time > 0.0 ? std::exp(-elapsed_s / p.bias_fade_time) : 1.0;
+  const double drawn_m2 = (1.0 - left * left) * p.jump_sigma * p.jump_sigma;
+  const double slow_m2 = p.slow_bias_walk * p.slow_bias_walk * elapsed_s + drawn_m2;
+  const double fast_m2 = p.fast_bias_walk * p.fast_bias_walk * elapsed_s + drawn_m2;
+  const double onset_m2 = p.onset_sigma * p.onset_sigma;
+  const BiasStep jump{0.0, p.jump_sigma * p.jump_sigma};
+  BiasSteps steps{};
+  steps[kS] = {BiasStep{}, BiasStep{0.0, onset_m2 + slow_m2}, BiasStep{0.0, onset_m2 + fast_m2}, jump};
+  steps[kL] = steps[kF] = {BiasStep{}, BiasStep{left, slow_m2}, BiasStep{left, fast_m2}, jump};
+  return steps;
 }
 
 }  // namespace urban_gnss

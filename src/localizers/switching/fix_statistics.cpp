@@ -56,20 +56,20 @@ double FixStatistics::range_sigma_m() const {
   return parameters_.ranges.middle_range_sigma_m() * std::sqrt(range_noise_.scale());
 }
 
-std::optional<RelativePlace> FixStatistics::place_by_ranges(const FixMeasurement& fix, const BiasGaussian& before) {
+std::optional<RelativePlace> FixStatistics::place_by_ranges(const FixMeasurement& fix, const PoseEstimate& before) {
   if (!parameters_.ranges.use_ranges || fix.satellites.empty()) return std::nullopt;
   nominal_cn0_.add(fix.satellites, parameters_.ranges.nlos);
   const auto nominal_dbhz = nominal_cn0_.dbhz();
   if (!nominal_dbhz) return std::nullopt;
   RelativePlace known;
-  known.offset = transform_point(before.pose(), fix.antenna_in_body) - fix.position;
+  known.offset = transform_point(before.pose, fix.antenna_in_body) - fix.position;
   known.covariance = before.covariance.topLeftCorner<2, 2>();
   RangeFixParameters ranges = parameters_.ranges;
   ranges.range_sigma = range_sigma_m();
   return range_fix(fix.satellites, *nominal_dbhz, known, ranges);
 }
 
-FixMeasurement FixStatistics::effective_fix(const FixMeasurement& fix, const BiasGaussian& before) {
+FixMeasurement FixStatistics::effective_fix(const FixMeasurement& fix, const PoseEstimate& before) {
   const auto place = place_by_ranges(fix, before);
   of_ranges_ = place.has_value();
   FixMeasurement effective;  // without its satellites, which have had their say
@@ -82,11 +82,10 @@ FixMeasurement FixStatistics::effective_fix(const FixMeasurement& fix, const Bia
   return effective;
 }
 
-void FixStatistics::learn_velocity(double time_s, double exceeding, const BiasGaussian& before,
-                                   const BiasGaussian& after) {
+void FixStatistics::learn_velocity(double time_s, double exceeding, const Pose2& before, const Pose2& after) {
   velocity_scale_.learn(exceeding);
   last_velocity_s_ = time_s;
-  track_.correct(before.mean.head<2>(), after.mean.head<2>());
+  track_.correct(before.position(), after.position());
 }
 
 void FixStatistics::learn_fix(double time_s, double exceeding) {
@@ -95,15 +94,14 @@ void FixStatistics::learn_fix(double time_s, double exceeding) {
   last_fix_s_ = time_s;
 }
 
-void FixStatistics::compare_with_odometry(const FixMeasurement& fix, const BiasGaussian& before,
-                                          const BiasGaussian& after) {
+void FixStatistics::compare_with_odometry(const FixMeasurement& fix, const PoseEstimate& before, const Pose2& after) {
   FixNoiseModel& noise = of_ranges_ ? range_noise_ : noise_;
   const Eigen::Matrix2d declared =
       of_ranges_ ? Eigen::Matrix2d(fix.covariance / noise.scale()) : parameters_.fix.direct_covariance(fix.covariance);
-  noise.compare(track_.beside(fix.position, declared, transform_point(before.pose(), fix.antenna_in_body),
+  noise.compare(track_.beside(fix.position, declared, transform_point(before.pose, fix.antenna_in_body),
                               std::sqrt(before.covariance(kYaw, kYaw)), parameters_.odometry.position_walk,
                               fix.time_s));
-  track_.correct(before.mean.head<2>(), after.mean.head<2>());
+  track_.correct(before.pose.position(), after.position());
   const double declared_m2 = 0.5 * declared.trace();
   const CommonErrorParameters& common = parameters_.common_error;
   common_variance_m2_ =

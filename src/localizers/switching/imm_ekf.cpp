@@ -54,58 +54,40 @@ void ImmEkf::doubt(const MotionDoubt& doubt) {
   }
 }
 
-QualityNumbers ImmEkf::mixed_qualities(const QualityTransition& quality, std::size_t to, ModeNumbers& before) const {
-  QualityNumbers weights{};
-  before = {};
-  for (std::size_t m = 0; m < kLastingModes; ++m) {
-    for (std::size_t from = 0; from < kQualityLevels; ++from) {
-      before[m] += weights[from][m] = probability_[from][m] * quality(static_cast<int>(from), static_cast<int>(to));
-    }
-  }
-  for (std::size_t m = 0; m < kContinuations; ++m) {
-    for (std::size_t from = 0; from < kQualityLevels; ++from) {
-      weights[from][m] = before[m] > 0.0 ? weights[from][m] / before[m] : (from == to ? 1.0 : 0.0);
-    }
-  }
-  return weights;
-}
-
 ImmEkf::Branches ImmEkf::branch(const FixMeasurement& fix) const {
   const double elapsed_s = statistics_.elapsed_s(fix.time_s);
-  const FixNoise noise = statistics_.fix_noise(fix.time_s);
   const ModeTransition transition = mode_transition(elapsed_s, parameters_.modes, statistics_.bias_odds());
   const QualityTransition quality = quality_transition(elapsed_s, parameters_.quality);
   const BiasSteps steps = bias_steps(elapsed_s, parameters_.modes);
   Branches branches;
   branches.expected_quality = quality.transpose() * quality_probabilities();
-  double largest = -std::numeric_limits<double>::infinity();
-  bool is_finite = true;
-  for (std::size_t level = 0; level < kQualityLevels; ++level) {
+  for (std::size_t to = 0; to < kQualityLevels; ++to) {
     // First the qualities, of each mode for itself: how a bias goes on from there does not depend on them.
-    ModeNumbers before;
-    BiasQuad modes;
-    mix_qualities(filters_, mixed_qualities(quality, level, before), modes);
-    std::array<ModeNumbers, kLastingModes> weights{};
-    ModeNumbers& prior = branches.probability[level];
-    for (std::size_t j = 0; j < kContinuations; ++j) {
-      double sum = 0.0;
-      for (std::size_t m = 0; m < kLastingModes; ++m) {
-        sum += weights[m][j] = before[m] * transition(static_cast<int>(m), static_cast<int>(j));
-      }
-      for (std::size_t m = 0; m < kLastingModes; ++m) {
-        weights[m][j] = sum > 0.0 ? weights[m][j] / sum : (m == 0 ? 1.0 : 0.0);
-      }
-      prior[j] = sum;
+    QualityNumbers qualities;
+    for (std::size_t from = 0; from < kQualityLevels; ++from) {
+      const double share = quality(static_cast<int>(from), static_cast<int>(to));
+      for (std::size_t m = 0; m < kContinuations; ++m) qualities[from][m] = share * probability_[from][m];
     }
-    BiasQuad& filter = branches.filters[level];
-    continue_biases(modes, weights, steps, filter);
-    branches.updates[level] = take_fix(filter, fix, noise, parameters_);
-    is_finite = is_finite && filter.is_finite();
+    BiasQuad mixed;
+    const ModeNumbers before = mix_qualities(filters_, qualities, to, mixed);
+    std::array<ModeNumbers, kLastingModes> modes;
+    for (std::size_t m = 0; m < kLastingModes; ++m) {
+      for (std::size_t j = 0; j < kContinuations; ++j) {
+        modes[m][j] = before[m] * transition(static_cast<int>(m), static_cast<int>(j));
+      }
+    }
+    branches.probability[to] = continue_biases(mixed, modes, steps, branches.filters[to]);
+  }
+  branches.updates = take_fix(branches.filters, fix, statistics_.fix_noise(fix.time_s), parameters_);
+  double largest = -std::numeric_limits<double>::infinity();
+  for (std::size_t level = 0; level < kQualityLevels; ++level) {
     for (std::size_t j = 0; j < kContinuations; ++j) {
-      if (prior[j] > 0.0) largest = std::max(largest, branches.updates[level].log_likelihood[j]);
+      if (branches.probability[level][j] > 0.0) {
+        largest = std::max(largest, branches.updates[level].log_likelihood[j]);
+      }
     }
   }
-  branches.are_finite = is_finite && std::isfinite(largest);
+  branches.are_finite = are_finite(branches.filters) && std::isfinite(largest);
   weigh(branches.probability, branches.updates, largest);
   return branches;
 }
@@ -131,7 +113,7 @@ FixOutcome ImmEkf::correct(const FixMeasurement& declared) {
     outcome.reason = "position, time or covariance cannot be used";
     return outcome;
   }
-  const Gaussian before = mixture();
+  const PoseEstimate before = pose_estimate_of(filters_, probability_);
   const FixMeasurement fix = statistics_.effective_fix(declared, before);
   const Branches branches = branch(fix);
   outcome.of_ranges = statistics_.of_ranges();
@@ -154,7 +136,7 @@ FixOutcome ImmEkf::correct(const FixMeasurement& declared) {
   statistics_.learn_fix(fix.time_s, exceeding);
   merge(branches);
   set_quality(bounded_quality(branches.expected_quality, quality_probabilities(), parameters_.quality));
-  statistics_.compare_with_odometry(fix, before, mixture());
+  statistics_.compare_with_odometry(fix, before, pose());
 
   outcome.decision = mode_probabilities()[0] >= 0.5 ? FixDecision::kAccepted : FixDecision::kBiasCompensated;
   if (any_outlier > 0.5) {
@@ -169,25 +151,22 @@ void ImmEkf::correct_velocity(const VelocityMeasurement& measured) {
   const Eigen::Matrix2d noise = statistics_.velocity_scale() * measured.covariance;
   const double inflation = statistics_.velocity_inflation(measured.time_s);
   BiasQuads next = filters_;
-  std::array<BiasQuadUpdate, kQualityLevels> updates;
+  const BiasQuadUpdates updates = take_velocity(next, measured, noise, inflation, parameters_.velocity.velocity_dof);
   double exceeding = 0.0;
   double largest = -std::numeric_limits<double>::infinity();
   for (std::size_t level = 0; level < kQualityLevels; ++level) {
-    const BiasQuadUpdate& update = updates[level] =
-        take_velocity(next[level], measured, noise, inflation, parameters_.velocity.velocity_dof);
-    if (!next[level].is_finite()) return;
     for (std::size_t m = 0; m < kLastingModes; ++m) {
-      if (update.white_nis[m] > LearntScale::kMedianNis) exceeding += probability_[level][m];
-      if (probability_[level][m] > 0.0) largest = std::max(largest, update.log_likelihood[m]);
+      if (updates[level].white_nis[m] > LearntScale::kMedianNis) exceeding += probability_[level][m];
+      if (probability_[level][m] > 0.0) largest = std::max(largest, updates[level].log_likelihood[m]);
     }
   }
-  if (!std::isfinite(largest)) return;
-  const Gaussian before = mixture();
+  if (!are_finite(next) || !std::isfinite(largest)) return;
+  const Pose2 before = pose();
   const QualityProbabilities quality = quality_probabilities();
   filters_ = next;
   weigh(probability_, updates, largest);
   set_quality(quality);  // errors of velocities last, and look like a heading that wanders
-  statistics_.learn_velocity(measured.time_s, exceeding, before, mixture());
+  statistics_.learn_velocity(measured.time_s, exceeding, before, pose());
 }
 
 Gaussian ImmEkf::mixture() const { return mixture_of(filters_, probability_); }
@@ -228,17 +207,16 @@ QualityProbabilities ImmEkf::quality_probabilities() const {
 Pose2 ImmEkf::pose() const { return pose_of(filters_, probability_); }
 
 PoseEstimate ImmEkf::estimate() const {
-  const Gaussian all = mixture();
-  PoseEstimate estimate{all.pose(), all.covariance.topLeftCorner<3, 3>()};
+  PoseEstimate estimate = pose_estimate_of(filters_, probability_);
   estimate.covariance.diagonal().head<2>().array() += statistics_.common_variance_m2();
   return estimate;
 }
 
 LocalizerHealth ImmEkf::health() const {
-  const Gaussian all = mixture();
+  const Eigen::Matrix3d covariance = pose_estimate_of(filters_, probability_).covariance;
   LocalizerHealth health;
-  health.heading_sigma_rad = std::sqrt(all.covariance(kYaw, kYaw));
-  health.position_spread_m = std::sqrt(all.covariance.topLeftCorner<2, 2>().trace());
+  health.heading_sigma_rad = std::sqrt(covariance(kYaw, kYaw));
+  health.position_spread_m = std::sqrt(covariance.topLeftCorner<2, 2>().trace());
   return health;
 }
 

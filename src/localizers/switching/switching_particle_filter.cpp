@@ -130,11 +130,12 @@ bool SwitchingParticleFilter::continue_all(const FixMeasurement& fix, Opinion& o
   const FixNoise noise = statistics_.fix_noise(fix.time_s);
   const ModeTransition transition = mode_transition(elapsed_s, parameters_.model.modes, statistics_.bias_odds());
   const QualityTransition quality = quality_transition(elapsed_s, parameters_.model.quality);
+  const BiasSteps steps = bias_steps(elapsed_s, parameters_.model.modes);
   next_.clear();
   for (const BiasHypothesis& before : hypotheses_) {
     for (const BiasMode to : kModes) {
       BiasGaussian state = before.state;
-      continue_bias(state, bias_step(before.mode, to, elapsed_s, parameters_.model.modes));
+      continue_bias(state, steps[index_of(before.mode)][index_of(to)]);
       const double weight =
           before.weight * transition(static_cast<int>(index_of(before.mode)), static_cast<int>(index_of(to)));
       for (std::size_t level = 0; level < kQualityLevels; ++level) {
@@ -173,7 +174,7 @@ FixOutcome SwitchingParticleFilter::correct(const FixMeasurement& declared) {
     outcome.reason = "position, time or covariance cannot be used";
     return outcome;
   }
-  const BiasGaussian before = mixture();
+  const PoseEstimate before = mixture().pose_estimate();
   const FixMeasurement fix = statistics_.effective_fix(declared, before);
   outcome.of_ranges = statistics_.of_ranges();
   const Eigen::Vector2d innovation = fix.position - transform_point(estimate_, fix.antenna_in_body);
@@ -191,7 +192,7 @@ FixOutcome SwitchingParticleFilter::correct(const FixMeasurement& declared) {
   reducer_.select(next_, most_, engine_);
   hypotheses_.swap(next_);
   statistics_.learn_fix(fix.time_s, opinion.exceeding);
-  statistics_.compare_with_odometry(fix, before, mixture());
+  statistics_.compare_with_odometry(fix, before, mixture().pose());
   draw_cloud();
   find_clusters();
 
@@ -223,9 +224,9 @@ void SwitchingParticleFilter::correct_velocity(const VelocityMeasurement& measur
   for (BiasHypothesis& next : next_) sum += next.weight = std::exp(next.weight - largest);
   for (BiasHypothesis& next : next_) next.weight /= sum;
   set_quality(quality_of(hypotheses_), next_);  // errors of velocities last, and look like a heading that wanders
-  const BiasGaussian before = mixture();
+  const Pose2 before = mixture().pose();
   hypotheses_.swap(next_);
-  statistics_.learn_velocity(measured.time_s, exceeding, before, mixture());
+  statistics_.learn_velocity(measured.time_s, exceeding, before, mixture().pose());
   find_clusters();
 }
 

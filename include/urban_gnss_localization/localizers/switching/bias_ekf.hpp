@@ -77,6 +77,7 @@ struct BiasGaussian {
   BiasEkfCovariance covariance{BiasEkfCovariance::Zero()};
 
   Pose2 pose() const { return {mean[0], mean[1], mean[2]}; }
+  PoseEstimate pose_estimate() const { return {pose(), covariance.topLeftCorner<3, 3>()}; }
   bool is_finite() const { return mean.allFinite() && covariance.allFinite(); }
 };
 
@@ -121,14 +122,7 @@ void predict(BiasGaussian& state, const MotionStep& step, const OdometryErrorPar
 /// Adds what the last step may be wrong by.
 void doubt(BiasGaussian& state, const MotionDoubt& doubt);
 
-/// How a bias goes on from the last fix to the next.
-struct BiasStep {
-  double left{0.0};       ///< share of it that is left
-  double growth_m2{0.0};  ///< variance per axis that comes to it
-};
-/// predict_bias() from the lasting mode `from` to a fix `elapsed_s` >= 0 later in mode `to`.
-BiasStep bias_step(BiasMode from, BiasMode to, double elapsed_s, const BiasModeParameters& parameters);
-/// The same within the state.
+/// The bias within the state goes on.
 void continue_bias(BiasGaussian& state, const BiasStep& step);
 
 /// What a measurement said.

@@ -83,21 +83,15 @@ ModeTransition mode_transition(double elapsed_s, const BiasModeParameters& param
 /// Shares of time in each mode in the long run.
 ModeProbabilities stationary_modes(const BiasModeParameters& parameters, double bias_odds = 1.0);
 
-/// A bias (m): Gaussian with the same variance (m^2) in x and y, independent.
-struct BiasState {
-  Eigen::Vector2d mean{Eigen::Vector2d::Zero()};
-  double variance{0.0};
+/// How a bias goes on from the last fix to the next.
+struct BiasStep {
+  double left{0.0};       ///< share of it that is left
+  double growth_m2{0.0};  ///< variance per axis that comes to it
 };
-
-/// What is left after `elapsed_s` >= 0 of a bias that goes on, as a share of it: a bias is a first-order Markov process
-/// whose stationary standard deviation is jump_sigma.
-double bias_fade(double elapsed_s, const BiasModeParameters& parameters);
-
-/// Variance (m^2 per axis) by which a bias in `to` grows over `elapsed_s` >= 0.
-double bias_growth(BiasMode to, double elapsed_s, const BiasModeParameters& parameters);
-
-/// The bias at a fix in mode `to`, from the bias at the last fix in the lasting mode `from`.
-BiasState predict_bias(const BiasState& bias, BiasMode from, BiasMode to, double elapsed_s,
-                       const BiasModeParameters& parameters);
+/// From the lasting mode (first index) to a mode of the next fix.
+using BiasSteps = std::array<std::array<BiasStep, kContinuations>, kLastingModes>;
+/// Steps over `elapsed_s` >= 0. A bias that goes on is a first-order Markov process, whose stationary standard
+/// deviation is jump_sigma.
+BiasSteps bias_steps(double elapsed_s, const BiasModeParameters& parameters);
 
 }  // namespace urban_gnss

@@ -18,8 +18,8 @@ using QualityNumbers = std::array<ModeNumbers, kQualityLevels>;
 struct BiasQuad {
   static constexpr int kPairs = kBiasStates * (kBiasStates + 1) / 2;
 
-  std::array<ModeNumbers, kBiasStates> mean{};
-  std::array<ModeNumbers, kPairs> covariance{};  ///< upper triangle, by rows
+  std::array<ModeNumbers, kBiasStates> mean;
+  std::array<ModeNumbers, kPairs> covariance;  ///< upper triangle, by rows
 
   /// Where the covariance of two states stands.
   static constexpr std::size_t pair(int i, int j) {
@@ -27,10 +27,11 @@ struct BiasQuad {
   }
   BiasGaussian at(std::size_t mode) const;
   void set(std::size_t mode, const BiasGaussian& state);
-  bool is_finite() const;
 };
 
 using BiasQuads = std::array<BiasQuad, kQualityLevels>;
+/// Whether all numbers are, and their sum.
+bool are_finite(const BiasQuads& filters);
 
 /// Dead-reckons a step, with the noise of each quality. Steps differ in nothing else.
 void predict(BiasQuads& filters, const std::array<MotionStep, kQualityLevels>& steps,
@@ -39,17 +40,17 @@ void predict(BiasQuads& filters, const std::array<MotionStep, kQualityLevels>& s
 /// Mean pose of all filters together, whose probabilities sum to 1: match_means().
 Pose2 pose_of(const BiasQuads& filters, const QualityNumbers& probability);
 /// Mean and covariance of the same: match_moments().
+PoseEstimate pose_estimate_of(const BiasQuads& filters, const QualityNumbers& probability);
 BiasGaussian mixture_of(const BiasQuads& filters, const QualityNumbers& probability);
-/// The mixture of the qualities, each mode for itself: of each mode, the weights of the qualities sum to 1.
-void mix_qualities(const BiasQuads& filters, const QualityNumbers& weights, BiasQuad& mixed);
+/// The mixture of the qualities, each mode for itself. Weights count relative to their sums, which are returned; where
+/// a mode has none, quality `otherwise` is all.
+ModeNumbers mix_qualities(const BiasQuads& filters, const QualityNumbers& weights, std::size_t otherwise,
+                          BiasQuad& mixed);
 
-/// How a bias goes on, by the mode before and the mode after: bias_step().
-using BiasSteps = std::array<std::array<BiasStep, kContinuations>, kLastingModes>;
-BiasSteps bias_steps(double elapsed_s, const BiasModeParameters& parameters);
-/// The states of the modes after, each a mixture of those before: continue_bias(). `weights` are by the mode before; of
-/// each mode after they sum to 1.
-void continue_biases(const BiasQuad& before, const std::array<ModeNumbers, kLastingModes>& weights,
-                     const BiasSteps& steps, BiasQuad& after);
+/// The states of the modes after, each a mixture of those before: continue_bias(). `weights` are by the mode before,
+/// and count relative to their sums, which are returned; where a mode after has none, it comes of direct reception.
+ModeNumbers continue_biases(const BiasQuad& before, const std::array<ModeNumbers, kLastingModes>& weights,
+                            const BiasSteps& steps, BiasQuad& after);
 /// A slow bias and a jump become one, with these weights, which sum to 1.
 void merge_jump(const BiasQuad& before, double slow, double jump, BiasQuad& merged);
 
@@ -57,13 +58,14 @@ void merge_jump(const BiasQuad& before, double slow, double jump, BiasQuad& merg
 struct BiasQuadUpdate {
   ModeNumbers log_likelihood, nis, white_nis, outlier;
 };
+using BiasQuadUpdates = std::array<BiasQuadUpdate, kQualityLevels>;
 /// Bayes' rule: multiplies by the likelihoods, of which the logarithm of the `largest` is told, and makes the sum 1.
-void weigh(QualityNumbers& probability, const std::array<BiasQuadUpdate, kQualityLevels>& updates, double largest);
+void weigh(QualityNumbers& probability, const BiasQuadUpdates& updates, double largest);
 /// take_fix(), each state in its mode.
-BiasQuadUpdate take_fix(BiasQuad& states, const FixMeasurement& fix, const FixNoise& noise,
-                        const SwitchingModelParameters& parameters);
+BiasQuadUpdates take_fix(BiasQuads& filters, const FixMeasurement& fix, const FixNoise& noise,
+                         const SwitchingModelParameters& parameters);
 /// take_velocity().
-BiasQuadUpdate take_velocity(BiasQuad& states, const VelocityMeasurement& measured, const Eigen::Matrix2d& noise,
-                             double inflation, double student_dof);
+BiasQuadUpdates take_velocity(BiasQuads& filters, const VelocityMeasurement& measured, const Eigen::Matrix2d& noise,
+                              double inflation, double student_dof);
 
 }  // namespace urban_gnss

@@ -25,10 +25,10 @@ class FixStatistics {
 
   /// s >= 0 since the last fix; since the start where there was none.
   double elapsed_s(double time_s) const;
-  /// The fix that a filter takes: the position by its ranges (range_fix(), beside the state `before` it) where it has
-  /// them, else the declared one with FixNoiseModel::effective_covariance(). Once a fix, before the others of this
+  /// The fix that a filter takes: the position by its ranges (range_fix(), beside the estimate `before` it) where it
+  /// has them, else the declared one with FixNoiseModel::effective_covariance(). Once a fix, before the others of this
   /// class.
-  FixMeasurement effective_fix(const FixMeasurement& fix, const BiasGaussian& before);
+  FixMeasurement effective_fix(const FixMeasurement& fix, const PoseEstimate& before);
   /// Whether the last fix was what its ranges say.
   bool of_ranges() const { return of_ranges_; }
   /// m, of a range in line of sight, as learnt.
@@ -43,7 +43,7 @@ class FixStatistics {
   /// A fix was taken, with a share `exceeding` of its NIS beyond the median.
   void learn_fix(double time_s, double exceeding);
   /// Lets the noise model see the fix beside the odometry alone; `before` and `after` it, all modes together.
-  void compare_with_odometry(const FixMeasurement& fix, const BiasGaussian& before, const BiasGaussian& after);
+  void compare_with_odometry(const FixMeasurement& fix, const PoseEstimate& before, const Pose2& after);
 
   double velocity_scale() const { return velocity_scale_.value(); }
   double velocity_inflation(double time_s) const {
@@ -52,14 +52,14 @@ class FixStatistics {
                : 1.0;
   }
   /// A velocity was taken; `before` and `after` it, all modes together.
-  void learn_velocity(double time_s, double exceeding, const BiasGaussian& before, const BiasGaussian& after);
+  void learn_velocity(double time_s, double exceeding, const Pose2& before, const Pose2& after);
 
   /// m^2 per axis, of the error that all fixes share.
   double common_variance_m2() const { return common_variance_m2_; }
 
  private:
   /// By the fix's ranges; nothing where they do not tell.
-  std::optional<RelativePlace> place_by_ranges(const FixMeasurement& fix, const BiasGaussian& before);
+  std::optional<RelativePlace> place_by_ranges(const FixMeasurement& fix, const PoseEstimate& before);
 
   SwitchingModelParameters parameters_;
   FixNoiseModel noise_;

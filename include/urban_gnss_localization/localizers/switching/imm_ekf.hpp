@@ -15,7 +15,7 @@ using ImmEkfParameters = SwitchingModelParameters;
 ///
 /// Each filter's state is (x, y, yaw, s, w, a, b_x, b_y): pose, relative error of the odometry's speed, constant and
 /// relative error of its yaw rate, bias of the fixes. In the direct mode the bias is 0. At a fix, the modes before it
-/// are mixed into those that can go on from them (mode_transition(), predict_bias()); each takes the fix with its own
+/// are mixed into those that can go on from them (mode_transition(), bias_steps()); each takes the fix with its own
 /// noise; its probability is multiplied by the fix's likelihood. A fix is an outlier with outlier_share: then it is
 /// anywhere, and says nothing. Each mode weighs that in, and a jump is a slow bias once the fix is taken.
 ///
@@ -57,14 +57,12 @@ class ImmEkf : public Localizer {
   /// The filters of all modes that a fix may have at each quality, each with the fix taken.
   struct Branches {
     BiasQuads filters;
-    std::array<BiasQuadUpdate, kQualityLevels> updates;
+    BiasQuadUpdates updates;
     QualityNumbers probability{};           ///< posterior
     QualityProbabilities expected_quality;  ///< before the fix
     bool are_finite{false};
   };
   Branches branch(const FixMeasurement& fix) const;
-  /// Of each mode, the weights of the qualities from which one comes to `to`, and how probable that is.
-  QualityNumbers mixed_qualities(const QualityTransition& quality, std::size_t to, ModeNumbers& before) const;
   /// Weighs the filters of each quality so that they sum to `target`.
   void set_quality(const QualityProbabilities& target);
   /// Goes on with the filters of the branches, those of slow bias and of a jump as one.
@@ -75,7 +73,7 @@ class ImmEkf : public Localizer {
   double nis_threshold_;
   FixStatistics statistics_;
   std::array<OdometryErrorParameters, kQualityLevels> levels_;
-  BiasQuads filters_;
+  BiasQuads filters_{};
   QualityNumbers probability_{};  ///< 0 of the idle filters
 };
 
