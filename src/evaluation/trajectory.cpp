@@ -8,8 +8,9 @@
 namespace urban_gnss {
 
 void sort_by_stamp(Trajectory& trajectory) {
-  std::stable_sort(trajectory.begin(), trajectory.end(),
-                   [](const TimedPose& a, const TimedPose& b) { return a.stamp < b.stamp; });
+  const auto is_earlier = [](const TimedPose& a, const TimedPose& b) { return a.stamp < b.stamp; };
+  if (std::is_sorted(trajectory.begin(), trajectory.end(), is_earlier)) return;
+  std::stable_sort(trajectory.begin(), trajectory.end(), is_earlier);
 }
 
 std::optional<TimedPose> interpolate(const Trajectory& trajectory, Stamp stamp, Stamp max_gap) {

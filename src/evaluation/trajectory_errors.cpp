@@ -47,6 +47,7 @@ ErrorSummary summarize_errors(const std::vector<ErrorSample>& samples, double co
   std::vector<double> headings;
   std::vector<double> nees;
   std::vector<double> position_nees;
+  for (auto* values : {&distances, &headings, &nees, &position_nees}) values->reserve(samples.size());
   std::size_t inside = 0;
   std::size_t beyond = 0;
   for (const ErrorSample& sample : samples) {
@@ -95,6 +96,7 @@ bool is_inside_95(const ErrorSample& sample) { return sample.position_nees <= kW
 
 TrajectoryErrors errors_at_truth(const Trajectory& truth, const Trajectory& estimate, Stamp max_gap) {
   TrajectoryErrors errors;
+  errors.samples.reserve(truth.size());
   for (const TimedPose& true_pose : truth) {
     const auto estimated = interpolate(estimate, true_pose.stamp, max_gap);
     if (!estimated || !is_finite(estimated->pose)) continue;

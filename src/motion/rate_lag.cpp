@@ -25,6 +25,7 @@ bool RateLagSearch::add(Stamp stamp, double odometry_radps, const RateAt& imu_at
   while (!waiting_.empty() && to_seconds(stamp - waiting_.front().stamp) > reach_s) {
     const Rate then = waiting_.front();
     waiting_.pop_front();
+    if (std::abs(then.radps) < kTurning_radps) continue;
     std::array<double, kLags> rates;
     bool is_complete = true;
     for (std::size_t i = 0; i < kLags && is_complete; ++i) {
@@ -32,7 +33,7 @@ bool RateLagSearch::add(Stamp stamp, double odometry_radps, const RateAt& imu_at
       is_complete = rate.has_value();
       if (rate) rates[i] = *rate;
     }
-    if (!is_complete || std::abs(then.radps) < kTurning_radps) continue;
+    if (!is_complete) continue;
     ++count_;
     odometry_square_ += then.radps * then.radps;
     for (std::size_t i = 0; i < kLags; ++i) {
