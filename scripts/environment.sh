@@ -46,6 +46,10 @@ if [ -n "$BASH_VERSION" ] && [[ $- == *i* ]]; then
     complete -F _urban_gnss_complete rosrun
   fi
 fi
+# Several nodes share the console of a launch file: each line says whose it is.
+if [ -z "$ROSCONSOLE_FORMAT" ]; then
+  export ROSCONSOLE_FORMAT='[${severity}] [${time}] [${node}]: ${message}'
+fi
 if [ -z "$ROS_IP" ]; then
   export ROS_HOSTNAME="${ROS_HOSTNAME:-localhost}"
 fi

@@ -19,7 +19,9 @@ def setup_of(content):
     if not isinstance(content, dict):
         raise BadSetup("is no map of parameters")
     for name, values in content.items():
-        if not (isinstance(values, dict) or values is None or "/" in str(name)):
+        if values is None:
+            raise BadSetup("{0} is empty: write {0}: {{}}, or take it out".format(name))
+        if not (isinstance(values, dict) or "/" in str(name)):
             raise BadSetup("{0} stands outside of a section and is not read: write {1}: {{{0}: ...}}".format(
                 name, DEFAULTS.section))
     section = next((name for name in LOCALIZERS if isinstance(content.get(name), dict)), None)

@@ -22,9 +22,11 @@ bool has_part(const std::string& path, const std::string& part) {
 /// What is wrong with an entry at the top of the file; empty where nothing is.
 std::string fault_of(const std::string& name, const YAML::Node& value, const YAML::Node& file,
                      const std::vector<std::string>& nodes) {
+  // rosparam ends with "cannot marshal None".
+  if (value.IsNull()) return name + " is empty: write " + name + ": {}, or take it out";
   for (const std::string& node : nodes) {
     if (name == node + "_node") return "section " + name + " is not read: the node is called " + node;
-    if (name == node) return value.IsMap() || value.IsNull() ? "" : name + " must be a map of names to values";
+    if (name == node) return value.IsMap() ? "" : name + " must be a map of names to values";
   }
   if (name.find('/') == std::string::npos && (!value.IsMap() || name == kExpert)) {
     return name + " stands outside of a section and is not read: write " + nodes.front() + ": {" + name + ": ...}";

@@ -3,8 +3,6 @@
 #include <ros/callback_queue.h>
 #include <ros/ros.h>
 
-#include <cstdlib>
-
 #include "urban_gnss_localization/parameters/params_file.hpp"
 #include "urban_gnss_localization/ros/event_log.hpp"
 
@@ -30,9 +28,6 @@ YAML::Node to_yaml(XmlRpc::XmlRpcValue& value) {
     default: return YAML::Node();
   }
 }
-
-/// Several nodes share a console: each line says whose it is, unless the user has a format of their own.
-constexpr const char* kConsoleFormat = "[${severity}] [${time}] [${node}]: ${message}";
 
 /// What a callback throws ends no node. NodeShell catches and counts; this is for callbacks that have none.
 void spin_some() {
@@ -76,7 +71,6 @@ void finish_reading(const ros::NodeHandle& private_node, const ParameterReader& 
 
 int run_node(int argc, char** argv, const std::string& name,
              const std::function<std::shared_ptr<void>(ros::NodeHandle&, ros::NodeHandle&)>& make) {
-  setenv("ROSCONSOLE_FORMAT", kConsoleFormat, 0);
   ros::init(argc, argv, name);
   ros::NodeHandle node;
   ros::NodeHandle private_node("~");

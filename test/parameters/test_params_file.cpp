@@ -12,7 +12,7 @@ ParamsFile look(const std::string& yaml, const std::vector<std::string>& nodes =
 
 TEST(ParamsFile, SectionsOfNodesAreFine) {
   for (const char* yaml : {"imm_ekf: {direct_sigma: 4}", "{imm_ekf: {direct_sigma: 4}, ukf: {expert: {}}}",
-                           "imm_ekf:", "/imm_ekf/direct_sigma: 4", "/robot1: {imm_ekf: {direct_sigma: 4}}"}) {
+                           "/imm_ekf/direct_sigma: 4", "/robot1: {imm_ekf: {direct_sigma: 4}}"}) {
     const auto found = look(yaml);
     EXPECT_TRUE(found.faults.empty()) << yaml << ": " << found.faults[0];
     EXPECT_EQ(found.hint, "") << yaml;
@@ -27,6 +27,7 @@ TEST(ParamsFile, WhatNobodyReadsIsRefused) {
       {"{imm_ekf: {direct_sigma: 4}, publish_tf: false}", "publish_tf stands outside"},
       {"expert: {imu: {use_imu_yaw_rate: false}}", "expert stands outside"},
       {"imm_ekf: [4]", "imm_ekf must be a map"},
+      {"{imm_ekf: {}, ukf: }", "ukf is empty: write ukf: {}"},
       {"[1, 2]", "must be a map"},
       {"", "must be a map"}};
   for (const auto& [yaml, fault] : cases) {

@@ -234,6 +234,15 @@ class Environment(unittest.TestCase):
                                       stderr=subprocess.STDOUT, universal_newlines=True)
                 self.assertIn("goes on", done.stdout, options)
 
+    def test_lines_on_the_console_name_their_node(self):
+        """Unless the user has another format."""
+        def format_with(**environment):
+            command = '. scripts/environment.sh; echo "$ROSCONSOLE_FORMAT"'
+            return subprocess.check_output(["bash", "-c", command], cwd=ROOT, universal_newlines=True,
+                                           env=dict(environment, PATH=os.environ["PATH"]))
+        self.assertEqual(format_with(), "[${severity}] [${time}] [${node}]: ${message}\n")
+        self.assertEqual(format_with(ROSCONSOLE_FORMAT="${message}"), "${message}\n")
+
 
 if __name__ == "__main__":
     unittest.main()

@@ -12,7 +12,6 @@ import unittest
 import rosbag
 import rospy
 import rostest
-import yaml
 from sensor_msgs.msg import NavSatFix, NavSatStatus
 from std_srvs.srv import Empty
 from urban_gnss_localization.msg import FixDecision, GpsBias
@@ -28,7 +27,7 @@ NOT_LOST_M = 6.0  # the raw fixes of the drive have an RMSE of 4.2 m: a quarter 
 class GraphTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        cls.graph = drive.Graph()
+        cls.graph = drive.Graph(listeners=4)  # those of /literal, too
         cls.drive = drive.Drive()
 
     def setUp(self):
@@ -118,8 +117,7 @@ class GraphTest(unittest.TestCase):
                 for index, (topic, message) in enumerate(self.drive.messages):
                     bag.write("/" + topic, message, message.header.stamp + rospy.Duration(0, index))
             parameters = os.path.join(directory, "parameters.yaml")
-            with open(parameters, "w", encoding="utf-8") as file:
-                yaml.safe_dump({"particle_filter": rospy.get_param("/offline")}, file)
+            subprocess.run(["rosparam", "dump", parameters, "/offline"], check=True)
             subprocess.run(["rosrun", "urban_gnss_localization", "replay", source, "--localizer", "particle_filter",
                             "--params", parameters, "--output", result], check=True)
             with rosbag.Bag(result) as bag:
