@@ -15,9 +15,9 @@ struct Symmetric2 {
     const Quad factor = 1.0 / determinant();
     return {yy * factor, -xy * factor, xx * factor};
   }
-  /// v' A v.
-  URBAN_GNSS_INLINE Quad square(const Quad& x, const Quad& y) const {
-    return x * (xx * x + xy * y) + y * (xy * x + yy * y);
+  /// v' A^-1 v.
+  URBAN_GNSS_INLINE Quad square_by_inverse(const Quad& x, const Quad& y) const {
+    return (x * (yy * x - xy * y) + y * (xx * y - xy * x)) / determinant();
   }
 };
 URBAN_GNSS_INLINE Symmetric2 sum(const Symmetric2& a, const Quad& factor, const Symmetric2& b) {
@@ -88,10 +88,10 @@ URBAN_GNSS_INLINE void see(const BiasQuad& states, const QuadFix& fix, QuadSight
 
 /// What the fix says to them. Returns the covariance of the innovation by which they are corrected.
 URBAN_GNSS_INLINE Symmetric2 judge(const QuadSight& sight, const QuadFix& fix, BiasQuadUpdate& update) {
-  const Quad white_nis = sum(sight.hph, quad(1.0), fix.white).inverse().square(sight.innovation_x, sight.innovation_y);
+  const Quad white_nis = sum(sight.hph, quad(1.0), fix.white).square_by_inverse(sight.innovation_x, sight.innovation_y);
   const Quad weight = quad_min(quad(1.0), (fix.tail_dof + kFixDof) / (fix.tail_dof + white_nis));
   const Symmetric2 plain = sum(sight.hph, quad(fix.inflation), fix.white);
-  const Quad nis = plain.inverse().square(sight.innovation_x, sight.innovation_y);
+  const Quad nis = plain.square_by_inverse(sight.innovation_x, sight.innovation_y);
   const Quad log_used = fix.log_kept + log_student(nis, fix.tail_dof, plain.determinant());
   const Quad ratio = quad_exp(-quad_abs(log_used - fix.log_outlier));
   const Quad outlier = (log_used > fix.log_outlier ? ratio : quad(1.0)) / (1.0 + ratio);
@@ -123,10 +123,10 @@ URBAN_GNSS_INLINE BiasQuadUpdate take_velocity(BiasQuad& states, const VelocityM
                        along_x * y[kSpeedScale] - predicted_y * y[kYaw],
                        along_y * y[kSpeedScale] + predicted_x * y[kYaw]};
   const Symmetric2 white{quad(noise(0, 0)), quad(noise(0, 1)), quad(noise(1, 1))};
-  const Quad white_nis = sum(hph, quad(1.0), white).inverse().square(innovation_x, innovation_y);
+  const Quad white_nis = sum(hph, quad(1.0), white).square_by_inverse(innovation_x, innovation_y);
   const Quad weight = quad_min(quad(1.0), (dof + 2.0) / (dof + white_nis));
   const Symmetric2 plain = sum(hph, quad(inflation), white);
-  const Quad nis = plain.inverse().square(innovation_x, innovation_y);
+  const Quad nis = plain.square_by_inverse(innovation_x, innovation_y);
   const Quad log_likelihood = log_student(nis, quad(dof), plain.determinant());
   correct(states, x, y, sum(hph, inflation / weight, white), innovation_x, innovation_y, quad(1.0), Quad{});
 

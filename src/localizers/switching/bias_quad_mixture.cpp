@@ -14,18 +14,27 @@ URBAN_GNSS_INLINE Quad share(Quad (&weight)[kParts], int otherwise) {
   return sum;
 }
 
+/// The yaw of the heaviest part, from which the yaws of the others count as differences.
+struct HeaviestQuad {
+  Quad weight, yaw;
+};
+template <int kParts, class YawOf>
+URBAN_GNSS_INLINE HeaviestQuad heaviest_of(const Quad (&weight)[kParts], const YawOf& yaw_of) {
+  HeaviestQuad heaviest{weight[0], yaw_of(0)};
+  for (int part = 1; part < kParts; ++part) {
+    const QuadBits is_heavier = weight[part] > heaviest.weight;
+    heaviest.weight = is_heavier ? weight[part] : heaviest.weight;
+    heaviest.yaw = is_heavier ? yaw_of(part) : heaviest.yaw;
+  }
+  return heaviest;
+}
+
 /// match_moments() of `kParts` states, one after the other: mean_of(part, i), covariance_of(part, i, j).
 template <int kParts, class MeanOf, class CovarianceOf>
 URBAN_GNSS_INLINE void mix(const Quad (&weight)[kParts], const MeanOf& mean_of, const CovarianceOf& covariance_of,
                            BiasQuad& whole) {
-  // Yaws count as differences from the heaviest's.
-  Quad heaviest = weight[0];
-  Quad centre = mean_of(0, kYaw);
-  for (int part = 1; part < kParts; ++part) {
-    const QuadBits is_heavier = weight[part] > heaviest;
-    heaviest = is_heavier ? weight[part] : heaviest;
-    centre = is_heavier ? mean_of(part, kYaw) : centre;
-  }
+  const auto yaw_of = [&](int part) URBAN_GNSS_INLINE_LAMBDA { return mean_of(part, kYaw); };
+  const Quad centre = heaviest_of(weight, yaw_of).yaw;
   Quad at[kBiasStates];
   const auto place_of = [&](int part, int i) URBAN_GNSS_INLINE_LAMBDA {
     return i == kYaw ? quad_wrap(mean_of(part, i) - centre) : mean_of(part, i);
@@ -55,47 +64,46 @@ URBAN_GNSS_INLINE void mix(const Quad (&weight)[kParts], const MeanOf& mean_of, 
   });
 }
 
-/// The heaviest of the filters.
-struct Heaviest {
-  std::size_t level{0};
-  std::size_t mode{0};
-};
-URBAN_GNSS_INLINE Heaviest heaviest_of(const QualityNumbers& weights) {
-  Heaviest found;
-  double most = weights[0][0];
-  for (std::size_t level = 0; level < kQualityLevels; ++level) {
-    for (std::size_t m = 0; m < kLastingModes; ++m) {
-      if (!(weights[level][m] > most)) continue;
-      most = weights[level][m];
-      found = {level, m};
+/// Means of all filters together.
+class WholeMean {
+ public:
+  URBAN_GNSS_INLINE WholeMean(const BiasQuads& filters, const QualityNumbers& probability) : filters_(filters) {
+    for (std::size_t level = 0; level < kQualityLevels; ++level) weights[level] = load(probability[level].data());
+    const auto yaw_of = [&](int level)
+                            URBAN_GNSS_INLINE_LAMBDA { return mean(filters[static_cast<std::size_t>(level)], kYaw); };
+    const HeaviestQuad heaviest = heaviest_of(weights, yaw_of);
+    int mode = 0;
+    for (int m = 1; m < static_cast<int>(kLastingModes); ++m)
+      mode = heaviest.weight[m] > heaviest.weight[mode] ? m : mode;
+    yaw_ = heaviest.yaw[mode];
+  }
+  /// match_means() in one state.
+  URBAN_GNSS_INLINE double operator()(int i) const {
+    const double centre = i == kYaw ? yaw_ : filters_[0].mean[static_cast<std::size_t>(i)][0];
+    Quad moved{};
+    for (std::size_t k = 0; k < kQualityLevels; ++k) {
+      moved += weights[k] * difference_of(i, mean(filters_[k], i), quad(centre));
     }
+    const double at = centre + sum_of(moved);
+    return i == kYaw ? wrap_angle(at) : at;
   }
-  return found;
-}
 
-/// match_means() of all in one state.
-URBAN_GNSS_INLINE double mean_of(const BiasQuads& filters, const Quad (&weights)[kQualityLevels], const Heaviest& from,
-                                 int i) {
-  const double centre = filters[from.level].mean[static_cast<std::size_t>(i)][from.mode];
-  Quad moved{};
-  for (std::size_t k = 0; k < kQualityLevels; ++k) {
-    moved += weights[k] * difference_of(i, mean(filters[k], i), quad(centre));
-  }
-  const double at = centre + sum_of(moved);
-  return i == kYaw ? wrap_angle(at) : at;
-}
+  Quad weights[kQualityLevels];
+
+ private:
+  const BiasQuads& filters_;
+  double yaw_;  ///< of the heaviest
+};
 
 /// match_moments() of all in the first `kStates` states.
 template <int kStates>
 URBAN_GNSS_INLINE void match_moments(const BiasQuads& filters, const QualityNumbers& probability,
                                      Eigen::Matrix<double, kStates, 1>& centre,
                                      Eigen::Matrix<double, kStates, kStates>& spread) {
-  Quad weights[kQualityLevels];
-  for (std::size_t level = 0; level < kQualityLevels; ++level) weights[level] = load(probability[level].data());
-  const Heaviest from = heaviest_of(probability);
+  const WholeMean mean_of(filters, probability);
   Quad apart[kStates][kQualityLevels];
   for_each_state<kStates>([&](int i) URBAN_GNSS_INLINE_LAMBDA {
-    centre[i] = mean_of(filters, weights, from, i);
+    centre[i] = mean_of(i);
     for (std::size_t k = 0; k < kQualityLevels; ++k) {
       apart[i][k] = difference_of(i, mean(filters[k], i), quad(centre[i]));
     }
@@ -103,7 +111,7 @@ URBAN_GNSS_INLINE void match_moments(const BiasQuads& filters, const QualityNumb
   for_each_pair<kStates>([&](int i, int j) URBAN_GNSS_INLINE_LAMBDA {
     Quad sum{};
     for (std::size_t k = 0; k < kQualityLevels; ++k) {
-      sum += weights[k] * (covariance(filters[k], i, j) + apart[i][k] * apart[j][k]);
+      sum += mean_of.weights[k] * (covariance(filters[k], i, j) + apart[i][k] * apart[j][k]);
     }
     spread(i, j) = spread(j, i) = sum_of(sum);
   });
@@ -112,11 +120,8 @@ URBAN_GNSS_INLINE void match_moments(const BiasQuads& filters, const QualityNumb
 }  // namespace
 
 URBAN_GNSS_VECTORISED Pose2 pose_of(const BiasQuads& filters, const QualityNumbers& probability) {
-  Quad weights[kQualityLevels];
-  for (std::size_t level = 0; level < kQualityLevels; ++level) weights[level] = load(probability[level].data());
-  const Heaviest from = heaviest_of(probability);
-  return {mean_of(filters, weights, from, 0), mean_of(filters, weights, from, 1),
-          mean_of(filters, weights, from, kYaw)};
+  const WholeMean mean_of(filters, probability);
+  return {mean_of(0), mean_of(1), mean_of(kYaw)};
 }
 
 URBAN_GNSS_VECTORISED PoseEstimate pose_estimate_of(const BiasQuads& filters, const QualityNumbers& probability) {
