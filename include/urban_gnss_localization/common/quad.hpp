@@ -102,7 +102,7 @@ URBAN_GNSS_INLINE Quad quad_log(const Quad& x) {
   using namespace quad_math;
   // So that the rest lies between sqrt(1/2) and sqrt(2).
   const QuadBits above = to_bits(x) - 0x3FE6A09E667F3BCD;
-  const QuadBits exponent = ((above + (std::int64_t{1023} << kMantissa)) >> kMantissa) - 1023;
+  const QuadBits exponent = above >> kMantissa;
   const Quad k = from_bits(exponent + kShiftBits) - kShift;
   const Quad f = from_bits(to_bits(x) - (exponent << kMantissa)) - 1.0;
   const Quad s = f / (2.0 + f);
