@@ -84,8 +84,8 @@ FILTERS = (
     ("`replay` of a drive of 400 s, with an output bag", "replay with a bag", DRIVE_S / 3000.0, ()),
     ("the same, without one", "replay", None, ()),
     ("from a fix to its `odometry/filtered`, live, wall time: median", "fix to odometry", 0.3e-3,
-     (("of it, rospy's way to itself", "rospy"),)),
-    ("the same, 99 %", "fix to odometry, 99 %", 2e-3, (("of it, rospy's way to itself", "rospy, 99 %"),)),
+     (("a node that only repeats odometry", "repeater"),)),
+    ("the same, 99 %", "fix to odometry, 99 %", 2e-3, (("a node that only repeats odometry", "repeater, 99 %"),)),
 )
 TABLES = {"particles": PARTICLES, "occlusion": OCCLUSION, "filters": FILTERS}
 
@@ -222,10 +222,10 @@ def run_occlusion_node(seconds=12):
 
 
 def run_latency(seconds=60):
-    """From a fix to the estimate that has it, by dev/latency.py, and what rospy takes of it."""
+    """From a fix to the estimate that has it, by dev/latency.py, and through a node that only repeats odometry."""
     output = output_of(sys.executable, os.path.join(campaign.ROOT, "dev", "latency.py"), "--seconds", "%d" % seconds)
     results = {}
-    for name, label in (("fix to odometry", "localizer: fix and odometry"), ("rospy", "rospy alone")):
+    for name, label in (("fix to odometry", "localizer: fix and odometry"), ("repeater", "repeater: odometry")):
         median, late = re.search(re.escape(label) + r" +([\d.]+) +([\d.]+)", output).groups()
         results[name], results[name + ", 99 %"] = summary([1e-3 * float(median)]), summary([1e-3 * float(late)])
     return results
