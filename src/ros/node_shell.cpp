@@ -19,10 +19,8 @@ const ros::WallDuration kErrorLasts(60.0);
 }  // namespace
 
 std::string StampCheck::fault(const std::string& topic, const ros::Time& stamp, const ros::Time& now) {
-  std::ostringstream text;
   if (stamp.sec > kLastSecond || stamp.nsec >= kNanoseconds) {
-    text << "header.stamp " << stamp.sec << " s " << stamp.nsec << " ns is no time";
-    return text.str();
+    return "header.stamp " + std::to_string(stamp.sec) + " s " + std::to_string(stamp.nsec) + " ns is no time";
   }
   if (now.isZero() || stamp.toSec() <= now.toSec() + kAhead.toSec()) {  // a simulated clock that nobody drives is 0
     ahead_.erase(topic);
@@ -33,6 +31,7 @@ std::string StampCheck::fault(const std::string& topic, const ros::Time& stamp, 
   const bool goes_on = run.length > 0 && stamp >= run.last && stamp - run.last < kGoesOn;
   run = {stamp, goes_on ? run.length + 1 : 1};
   if (run.length >= kConfirm) return {};
+  std::ostringstream text;
   text << "header.stamp " << stamp.sec << " s is " << std::fixed << std::setprecision(1)
        << (stamp.toSec() - now.toSec()) / kAhead.toSec() << " h ahead of this computer's clock";
   return text.str();
