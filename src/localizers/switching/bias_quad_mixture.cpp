@@ -73,8 +73,9 @@ class WholeMean {
                             URBAN_GNSS_INLINE_LAMBDA { return mean(filters[static_cast<std::size_t>(level)], kYaw); };
     const HeaviestQuad heaviest = heaviest_of(weights, yaw_of);
     int mode = 0;
-    for (int m = 1; m < static_cast<int>(kLastingModes); ++m)
-      mode = heaviest.weight[m] > heaviest.weight[mode] ? m : mode;
+    for (int m = 1; m < static_cast<int>(kLastingModes); ++m) {
+      if (heaviest.weight[m] > heaviest.weight[mode]) mode = m;
+    }
     yaw_ = heaviest.yaw[mode];
   }
   /// match_means() in one state.
