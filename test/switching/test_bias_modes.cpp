@@ -2,6 +2,7 @@
 
 #include <Eigen/Dense>
 #include <cmath>
+#include <unsupported/Eigen/MatrixFunctions>
 
 #include "matchers.hpp"
 #include "urban_gnss_localization/gnss/fix_sigma.hpp"
@@ -60,6 +61,19 @@ TEST(BiasModes, NothingChangesInNoTimeAndRatesAreThoseOfTheTimes) {
       0.25, -0.25 - 0.1, 0.08, 0.02,   //
       0.8, 0.8, -2.0, 0.4;
   EXPECT_LT((rates - expected).cwiseAbs().maxCoeff(), 1e-5) << rates;
+}
+
+TEST(BiasModes, IsTheMatrixExponentialOfTheRates) {
+  const BiasModeParameters p = times(5.0, 10.0, 0.5, 4.0, 0.2);
+  Eigen::Matrix4d rates;
+  rates << -0.2, 0.08, 0.08, 0.04,  //
+      0.25, -0.35, 0.08, 0.02,      //
+      0.8, 0.8, -2.0, 0.4,          //
+      0.25, 0.0, 0.08, -0.33;
+  for (const double elapsed : {1e-4, 0.01, 0.03, 0.2, 1.0, 3.7, 60.0, 400.0}) {
+    const Eigen::Matrix4d exponential = (elapsed * rates).exp();
+    EXPECT_LT((mode_transition(elapsed, p) - exponential.topRows<3>()).cwiseAbs().maxCoeff(), 1e-13) << elapsed;
+  }
 }
 
 TEST(BiasModes, TwoStepsAreOneAndTheLongRunForgetsTheStart) {
