@@ -1,11 +1,59 @@
 #include "urban_gnss_localization/occlusion/local_map.hpp"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdint>
 
+#include "urban_gnss_localization/common/vector_math.hpp"
 #include "urban_gnss_localization/geometry/angles.hpp"
 #include "urban_gnss_localization/geometry/isometry.hpp"
 
 namespace urban_gnss {
+namespace {
+
+/// Which points of a scan are cut.
+struct CutLimits {
+  std::array<float, 12> to_base;  ///< rows of the transform from the sensor
+  float body_m;
+  float min_height_m;
+  float max_range_m;
+};
+
+/// What becomes of a few points one after the other.
+struct CutPiece {
+  static constexpr std::size_t kSize = 256;
+
+  std::array<std::int32_t, kSize> is_kept;  ///< 1 or 0
+  std::int32_t not_finite;
+  std::int32_t own_body;
+};
+
+/// Judges `count` points, CutPiece::kSize at most. `xyz` in m in the sensor's frame.
+URBAN_GNSS_VECTORISED void judge(const float* xyz, std::size_t count, const CutLimits limits, CutPiece& piece) {
+  const auto& [xx, xy, xz, x0, yx, yy, yz, y0, zx, zy, zz, z0] = limits.to_base;
+  std::int32_t not_finite = 0;
+  std::int32_t own_body = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const float x = xyz[3 * i];
+    const float y = xyz[3 * i + 1];
+    const float z = xyz[3 * i + 2];
+    const float base_x = xx * x + xy * y + xz * z + x0;
+    const float base_y = yx * x + yy * y + yz * z + y0;
+    const float base_z = zx * x + zy * y + zz * z + z0;
+    const auto is_finite = static_cast<std::int32_t>((x - x == 0.0F) & (y - y == 0.0F) & (z - z == 0.0F));
+    const auto is_own_body = static_cast<std::int32_t>(std::sqrt(base_x * base_x + base_y * base_y) < limits.body_m);
+    const auto is_cut = static_cast<std::int32_t>((base_z < limits.min_height_m) |
+                                                  (std::sqrt(x * x + (y * y + z * z)) > limits.max_range_m));
+    piece.is_kept[i] = is_finite & ~(is_own_body | is_cut);
+    not_finite += 1 - is_finite;
+    own_body += is_finite & is_own_body;
+  }
+  piece.not_finite = not_finite;
+  piece.own_body = own_body;
+}
+
+}  // namespace
 
 void LocalMapParameters::check(std::vector<std::string>& faults) const {
   if (body_radius >= max_scan_range) faults.push_back("body_radius: must be less than max_scan_range");
@@ -84,23 +132,26 @@ void LocalMap::note_placement(const Alignment& alignment, const Eigen::Isometry3
 }
 
 PointCloud LocalMap::cut(const PointCloud& scan, const Eigen::Isometry3d& sensor_in_base, ScanReport& report) const {
+  CutLimits limits{{},
+                   static_cast<float>(parameters_.body_radius),
+                   static_cast<float>(parameters_.min_height),
+                   static_cast<float>(parameters_.max_scan_range)};
   const Eigen::Isometry3f to_base = sensor_in_base.cast<float>();
-  const auto body_m = static_cast<float>(parameters_.body_radius);
-  const auto min_height_m = static_cast<float>(parameters_.min_height);
-  const auto max_range_m = static_cast<float>(parameters_.max_scan_range);
+  Eigen::Map<Eigen::Matrix<float, 3, 4, Eigen::RowMajor>>(limits.to_base.data()) = to_base.affine();
   PointCloud kept;
   kept.resize(scan.size());
-  // Each is written down, and the next one over those that are cut: that is quicker than to jump.
+  CutPiece piece;
   std::size_t count = 0;
-  for (const Eigen::Vector3f& point : scan) {
-    const Eigen::Vector3f in_base = to_base * point;
-    const bool is_finite = point.allFinite();
-    const bool is_own_body = is_finite & (in_base.head<2>().norm() < body_m);
-    const bool is_kept = is_finite & !(is_own_body | (in_base.z() < min_height_m) | (point.norm() > max_range_m));
-    report.not_finite += static_cast<std::size_t>(!is_finite);
-    report.own_body += static_cast<std::size_t>(is_own_body);
-    kept[count] = point;
-    count += static_cast<std::size_t>(is_kept);
+  for (std::size_t first = 0; first < scan.size(); first += CutPiece::kSize) {
+    const std::size_t size = std::min(CutPiece::kSize, scan.size() - first);
+    judge(scan[first].data(), size, limits, piece);
+    report.not_finite += static_cast<std::size_t>(piece.not_finite);
+    report.own_body += static_cast<std::size_t>(piece.own_body);
+    // Each is written down, and the next one over those that are cut: that is quicker than to jump.
+    for (std::size_t i = 0; i < size; ++i) {
+      kept[count] = scan[first + i];
+      count += static_cast<std::size_t>(piece.is_kept[i]);
+    }
   }
   kept.resize(count);
   report.cut = scan.size() - report.not_finite - count;

@@ -197,6 +197,49 @@ TEST(LocalMap, CutsRobotGroundAndRange) {
   EXPECT_NE(map.map().find({90.0, 0.2, 6.5}), VoxelMap::kNone);
 }
 
+TEST(LocalMap, CutsAPieceAsPointAfterPoint) {
+  LocalMapParameters parameters;
+  parameters.align = false;
+  parameters.min_height = 0.5;
+  RandomEngine engine = make_engine(21);
+  for (const Eigen::Isometry3d& sensor : {pose(0.0, 0.0, 0.0, 0.0), pose(0.7, -0.2, 1.8, 0.5, 0.1, -0.2)}) {
+    // On the limits themselves, what is no point, and both sides of each limit; several pieces, the last one short.
+    PointCloud scan = {{1.0F, 0.0F, 0.5F},   {0.6F, 0.8F, 0.5F}, {2.0F, 0.0F, 0.5F},  {100.0F, 0.0F, 0.0F},
+                       {60.0F, 0.0F, 80.0F}, {NAN, 5, 5},        {5, INFINITY, 5},    {5, 5, -INFINITY},
+                       {0, 0, NAN},          {0, 0, 1},          {1e30F, 0.0F, 0.0F}, {5.0F, 5.0F, 0.5F}};
+    while (scan.size() < 3001) {
+      const double spread_m = scan.size() % 3 == 0 ? 1.0 : scan.size() % 3 == 1 ? 5.0 : 60.0;
+      scan.push_back(
+          (spread_m * Eigen::Vector3d(draw_normal(engine), draw_normal(engine), draw_normal(engine))).cast<float>());
+    }
+    PointCloud kept;
+    std::size_t not_finite = 0;
+    std::size_t own_body = 0;
+    const Eigen::Isometry3f to_base = sensor.cast<float>();
+    for (const Eigen::Vector3f& point : scan) {
+      const Eigen::Vector3f in_base = to_base * point;
+      const bool is_own_body = in_base.head<2>().norm() < 1.0F;
+      if (!point.allFinite()) {
+        ++not_finite;
+      } else if (is_own_body) {
+        ++own_body;
+      } else if (!(in_base.z() < 0.5F) && !(point.norm() > 100.0F)) {
+        kept.push_back(point);
+      }
+    }
+    ASSERT_GT(own_body, 100u);
+    ASSERT_GT(kept.size(), 500u);
+    LocalMap map(parameters, {}, {});
+    const ScanReport report = map.add_scan(scan, sensor, Eigen::Isometry3d::Identity());
+    EXPECT_EQ(report.not_finite, not_finite);
+    EXPECT_EQ(report.own_body, own_body);
+    EXPECT_EQ(report.cut, scan.size() - not_finite - kept.size());
+    VoxelMap plain{VoxelMapParameters()};
+    plain.add_scan(transformed(kept, sensor), sensor.translation());
+    EXPECT_EQ(map.map().points(), plain.points());
+  }
+}
+
 TEST(LocalMap, EmptyScansAndUnknownTransformsAreHarmless) {
   LocalMap map({}, {}, {});
   EXPECT_EQ(map.add_scan({}, kSensor, Eigen::Isometry3d::Identity()).insertion.new_voxels, 0u);
