@@ -76,13 +76,9 @@ class KeyIndex {
  private:
   static constexpr std::size_t kMinCapacity = 64;
 
-  /// Fibonacci hashing of blocks of 2 x 2 x 2 neighbours (of keys made by voxel_key()), whose eight keys then share one
-  /// line of the cache: a ray goes from neighbour to neighbour.
+  /// Fibonacci hashing, of both halves of the key.
   std::size_t home(Key key) const {
-    constexpr Key kInBlock = Key{1} | Key{1} << 21U | Key{1} << 42U;
-    const Key place = (key & 1U) | (key >> 20U & 2U) | (key >> 40U & 4U);
-    const Key block = key & ~kInBlock;
-    return static_cast<std::size_t>(((block ^ block >> 32U) * 0x9E3779B97F4A7C15ULL >> 20U << 3U) + place) & mask_;
+    return static_cast<std::size_t>((key ^ key >> 32U) * 0x9E3779B97F4A7C15ULL >> 32U) & mask_;
   }
 
   void grow() {
