@@ -92,7 +92,8 @@ class RayNeighbourhood {
       is_above |= y > 0.0F;
       is_below |= y < 0.0F;
     }
-    return (bits_of(is_right) != 0) & (bits_of(is_left) != 0) & (bits_of(is_above) != 0) & (bits_of(is_below) != 0);
+    const auto any = [](Mask4 mask) { return bits_of(mask) != 0 ? 1U : 0U; };
+    return (any(is_right) & any(is_left) & any(is_above) & any(is_below)) != 0;
   }
 
   /// The points linked to one, and those of them that are less than 180 degrees to its left; of two in one line with

@@ -71,8 +71,9 @@ struct Limits {
 class Candidates {
  public:
   /// Puts the voxels that are asked for in these cells, if they are within the limits, into `solid` and `permeable`.
-  void sort(const VoxelMap& map, const VoxelMap::NearbyVoxels& nearby, std::size_t cells, const RayFrame frame,
-            const Limits limits, RayNeighbourhood& solid, RayNeighbourhood& permeable) {
+  URBAN_GNSS_INLINE void sort(const VoxelMap& map, const VoxelMap::NearbyVoxels& nearby, std::size_t cells,
+                              const RayFrame frame, const Limits limits, RayNeighbourhood& solid,
+                              RayNeighbourhood& permeable) {
     const std::size_t count = gather(map, nearby, cells);
     std::size_t solids = 0;
     std::size_t permeables = 0;
@@ -112,7 +113,7 @@ class Candidates {
   using Chosen = std::array<std::uint16_t, kMost + 1>;
 
   /// The number of voxels, and nowhere's up to the next multiple of four.
-  std::size_t gather(const VoxelMap& map, const VoxelMap::NearbyVoxels& nearby, std::size_t cells) {
+  URBAN_GNSS_INLINE std::size_t gather(const VoxelMap& map, const VoxelMap::NearbyVoxels& nearby, std::size_t cells) {
     std::size_t count = 0;
     for (std::size_t i = 0; i < cells; ++i) {
       VoxelMap::for_each_wanted(
@@ -122,7 +123,7 @@ class Candidates {
     return count;
   }
 
-  void add(const Chosen& chosen, std::size_t count, RayNeighbourhood& to) const {
+  URBAN_GNSS_INLINE void add(const Chosen& chosen, std::size_t count, RayNeighbourhood& to) const {
     to.clear();
     for (std::size_t k = 0; k < count; ++k) {
       const std::size_t i = chosen[k];
