@@ -78,6 +78,7 @@ OcclusionNode::~OcclusionNode() { fix_subscriber_.shutdown(); }  // fix_watch_ h
 void OcclusionNode::on_cloud(const sensor_msgs::PointCloud2ConstPtr& message) {
   queue_->add_cloud(to_queued_cloud(message));
   io_.report(queue_->take_events());
+  work_timer_.start();
 }
 
 void OcclusionNode::on_satellites(const urban_gnss_localization::SatelliteArray& message) {
@@ -99,6 +100,7 @@ void OcclusionNode::on_fix(const sensor_msgs::NavSatFixConstPtr& message) {
   queue_->add_fix(
       to_queued_fix(message, [this, message](const FixAssessment* assessment) { publish(message, assessment); }));
   settle_fixes();
+  work_timer_.start();
 }
 
 /// A fix waits for nothing but its transform and its satellites, and for the cloud that is just put into the map.
@@ -107,14 +109,16 @@ void OcclusionNode::settle_fixes() {
   io_.report(queue_->take_events());
 }
 
-/// One cloud, then what has come meanwhile.
+/// One cloud, then what has come meanwhile; again and again while something waits.
 void OcclusionNode::work() {
   queue_->settle_fixes();
   queue_->work();
   io_.report(queue_->take_events());
+  if (!queue_->has_waiting()) work_timer_.stop();
 }
 
 void OcclusionNode::every_second() {
+  work();  // the prior map waits for a heading, not for a message
   fix_watch_.check_publishers();
   diagnostics_.update();
 }

@@ -98,6 +98,8 @@ class OcclusionQueue {
   /// Puts one cloud into the map, where one can be, and settles the fixes that need not wait. Whether a cloud was
   /// settled: there may be more.
   bool work();
+  /// Whether a cloud or a fix waits for work(), which may be for its transform.
+  bool has_waiting() const { return !clouds_.empty() || !fixes_.empty(); }
   /// Only settles the fixes that need not wait, by the map as it is: a cloud takes up to a tenth of a second, and
   /// changes the map by a metre of the way.
   void settle_fixes();
