@@ -39,6 +39,8 @@ OcclusionNode::OcclusionNode(ros::NodeHandle& node, ros::NodeHandle& private_nod
   marker_publisher_ = node.advertise<visualization_msgs::MarkerArray>(topics::kVisibilityMarkers, 2);
   sky_publisher_ = node.advertise<sensor_msgs::Image>(topics::kSkyPlot, 2);
   map_publisher_ = node.advertise<sensor_msgs::PointCloud2>(topics::kOcclusionMap, 1, true);
+  // Before the subscribers, whose callbacks start it: a nodelet's may come while this goes on.
+  work_timer_ = io_.every(node, 0.005, "the node's work", [this] { work(); });
   subscribe(node, settings.pipeline.imu_orientation.is_used());
   clear_service_ = io_.serve<std_srvs::Trigger::Request, std_srvs::Trigger::Response>(
       private_node, "clear_map", [this](auto&, auto& response) { clear_map(response); });
@@ -48,7 +50,6 @@ OcclusionNode::OcclusionNode(ros::NodeHandle& node, ros::NodeHandle& private_nod
 
   diagnostics_.setHardwareID("none");
   diagnostics_.add("occlusion", this, &OcclusionNode::diagnose);
-  work_timer_ = io_.every(node, 0.005, "the node's work", [this] { work(); });
   second_timer_ = io_.every(node, 1.0, "the node's timer", [this] { every_second(); });
   five_second_timer_ = io_.every(node, 5.0, "the node's timer", [this] { every_five_seconds(); });
   map_timer_ = io_.every(node, parameters_.map_publish_period, "the map's timer", [this] { publish_map(); });
