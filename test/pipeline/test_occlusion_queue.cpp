@@ -139,14 +139,18 @@ TEST_F(OcclusionQueueTest, AFixIsWeighedByMapAndSatellites) {
 
 TEST_F(OcclusionQueueTest, CloudAndFixWaitForTheirTransform) {
   tell_pose(0.0);
+  EXPECT_FALSE(queue.has_waiting());
   add_cloud(0.3);
+  EXPECT_TRUE(queue.has_waiting());
   add_satellites(0.3);
   add_fix(0.3);
   work();
   EXPECT_THAT(settled, IsEmpty());
   EXPECT_EQ(queue.tally().clouds_in_map, 0U);
+  EXPECT_TRUE(queue.has_waiting());
   tell_pose(0.4);
   work();
+  EXPECT_FALSE(queue.has_waiting());
   ASSERT_EQ(settled.size(), 1U);
   EXPECT_EQ(settled[0].first_blocked, 1.0) << "the cloud goes in first";
 }
@@ -160,6 +164,7 @@ TEST_F(OcclusionQueueTest, AFixThatIsSettledAloneDoesNotWaitForTheCloudsBeforeIt
   add_fix(1.2);
   queue.settle_fixes();
   EXPECT_EQ(settled.size(), 2u);
+  EXPECT_TRUE(queue.has_waiting()) << "two clouds";
   EXPECT_EQ(queue.tally().clouds_in_map, 1u) << "that of the epoch before";
   work();
   EXPECT_EQ(queue.tally().clouds_in_map, 3u);
