@@ -35,8 +35,8 @@ if [ -n "$BASH_VERSION" ] && [[ $- == *i* ]]; then
   # It does not look into hidden folders, where scripts/setup.sh builds.
   if type _roscomplete_exe > /dev/null 2>&1; then
     _urban_gnss_programs=$(find -L "$_urban_gnss_root/.workspace/devel/lib/urban_gnss_localization" \
-      "$_urban_gnss_root/reports" "$_urban_gnss_root/doctor" -maxdepth 1 -type f -perm /111 ! -name '*_tests' \
-      2> /dev/null | sed 's/.*\///') || true
+      "$_urban_gnss_root/reports" "$_urban_gnss_root/doctor" -maxdepth 1 -type f -perm /111 \
+      ! -name '*_tests' ! -name 'test_*' 2> /dev/null | sed 's/.*\///') || true
     _urban_gnss_complete() {
       _roscomplete_exe
       if [ "$COMP_CWORD" -eq 2 ] && [ "${COMP_WORDS[1]}" = urban_gnss_localization ]; then

@@ -210,7 +210,10 @@ void ParameterReader::on_end(const std::vector<std::string>& faults) {
 /// What someone may have meant who wrote `path`; empty where nothing is like it.
 std::string ParameterReader::hint(const std::string& path) const {
   const std::string name = last_name(path);
+  const std::string group = "." + path + ".";
   for (const std::string& known : known_) {
+    const auto at = known.find(group);
+    if (at != std::string::npos) return "; it is " + known.substr(0, at + group.size() - 1);
     if (last_name(known) == name) return "; it is " + known;
     for (const auto& [former, now] : kFormerNames) {
       if (name == former && last_name(known) == now) return "; it is now " + known;

@@ -195,8 +195,10 @@ void LocalizerNode::on_datum(const sensor_msgs::NavSatFix& message) {
 void LocalizerNode::set_datum(const urban_gnss_localization::SetDatum::Request& request,
                               urban_gnss_localization::SetDatum::Response& response) {
   try {
-    pipeline_.set_datum({request.latitude, request.longitude, request.altitude});
-    response.success = true;
+    const GeodeticPosition datum{request.latitude, request.longitude, request.altitude};
+    response.message = pipeline_.doubt_of_datum(datum);
+    response.success = response.message.empty();
+    if (response.success) pipeline_.set_datum(datum);
   } catch (const std::invalid_argument& error) {
     response.success = false;
     response.message = error.what();

@@ -14,7 +14,9 @@
 #include <vector>
 
 #include "files/input_files.hpp"
+#include "urban_gnss_localization/common/parameters.hpp"
 #include "urban_gnss_localization/common/pending_file.hpp"
+#include "urban_gnss_localization/parameters/edit_distance.hpp"
 
 namespace urban_gnss {
 
@@ -82,6 +84,7 @@ class CommandLine {
   /// Reads the options and does the work. The exit status: 1 where either fails, with the reason on standard error.
   int run(int argc, char** argv, const std::function<void()>& work) {
     try {
+      require_options(argc, argv);
       app_.parse(argc, argv);
     } catch (const CLI::ParseError& error) {
       return app_.exit(error) == 0 ? 0 : 1;
@@ -97,6 +100,9 @@ class CommandLine {
       std::cerr << program_ << ": not enough memory; the command was " << command_.substr(command_.find(program_))
                 << inputs_.unless_named_in("") << '\n';
       return 1;
+    } catch (const ParameterError& error) {  // names the file, if there is one
+      std::cerr << program_ << ": " << error.what() << '\n';
+      return 1;
     } catch (const std::exception& error) {
       std::cerr << program_ << ": " << error.what() << inputs_.unless_named_in(error.what()) << '\n';
       return 1;
@@ -105,6 +111,25 @@ class CommandLine {
   }
 
  private:
+  /// Throws CLI::ExtrasError for the first option that there is not, with what may be meant. CLI11 would blame its
+  /// value, which it takes for a file to read.
+  void require_options(int argc, char** argv) const {
+    for (int i = 1; i < argc && std::string(argv[i]) != "--"; ++i) {
+      const std::string argument = argv[i];
+      const std::string name = argument.substr(0, argument.find('='));
+      if (name.rfind("--", 0) != 0 || app_.get_option_no_throw(name) != nullptr) continue;
+      std::string nearest;
+      for (const CLI::Option* option : app_.get_options()) {
+        for (const std::string& known : option->get_lnames()) {
+          if (nearest.empty() || edit_distance(name, "--" + known) < edit_distance(name, nearest))
+            nearest = "--" + known;
+        }
+      }
+      const bool is_near = edit_distance(name, nearest) <= 1 + name.size() / 3;
+      throw CLI::ExtrasError(name + ": no such option" + (is_near ? "; did you mean " + nearest + "?" : ""),
+                             CLI::ExitCodes::ExtrasError);
+    }
+  }
   static bool has(const std::vector<const CLI::Option*>& options, const CLI::Option* option) {
     return std::find(options.begin(), options.end(), option) != options.end();
   }

@@ -280,6 +280,7 @@ TEST(TieredParameters, TierOneStandsAtTheTopAndTheRestBelowExpert) {
 
 TEST(TieredParameters, FlatNameIsRefusedWithTheNewPlace) {
   EXPECT_EQ(faults_in_tiers("mass_kg: 4").at(0), "a.yaml:1: mass_kg: no such parameter; it is expert.robot.mass_kg");
+  EXPECT_EQ(faults_in_tiers("robot: {mass_kg: 4}").at(0), "a.yaml:1: robot: no such parameter; it is expert.robot");
   EXPECT_EQ(faults_in_tiers("expert: {height_m: 4}").at(0),
             "a.yaml:1: expert.height_m: no such parameter; it is height_m");
   EXPECT_EQ(faults_in_tiers("expert: {robot: {mas_kg: 4}}").at(0),

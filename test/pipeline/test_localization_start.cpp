@@ -1,3 +1,5 @@
+#include <gmock/gmock.h>
+
 #include <cmath>
 #include <functional>
 
@@ -166,6 +168,17 @@ TEST(LocalizationPipeline, PoseThatIsSetStartsAnew) {
   early.pipeline.set_datum(kDatum);
   early.drive(0.0);
   EXPECT_TRUE(early.pipeline.initialized());
+}
+
+TEST(LocalizationPipeline, ADatumThatNobodyCanMeanIsDoubted) {
+  Rig rig("datum: [33.0, 130.0, 20.0]");
+  EXPECT_EQ(rig.pipeline.doubt_of_datum({48.0, 11.0, 500.0}), "") << "nothing is known before the start";
+  EXPECT_EQ(rig.pipeline.doubt_of_datum({}), "latitude, longitude and altitude are all 0");
+  rig.run(0.0, 40.0);
+  EXPECT_EQ(rig.pipeline.doubt_of_datum({33.2, 130.1, 0.0}), "");
+  EXPECT_THAT(rig.pipeline.doubt_of_datum({48.0, 11.0, 500.0}), testing::HasSubstr("from the robot, farther than"));
+  EXPECT_THAT(rig.pipeline.doubt_of_datum({33.0, -130.0, 20.0}), testing::HasSubstr("sign of the longitude"));
+  EXPECT_THROW(rig.pipeline.doubt_of_datum({91.0, 0.0, 0.0}), std::invalid_argument);
 }
 
 TEST(LocalizationPipeline, DatumThatIsSetMovesTheMap) {

@@ -102,7 +102,17 @@ class ToolTest(unittest.TestCase):
             results.append(method)
         self.assertEqual(*results)
 
+    def test_misspelt_options_are_named(self):
+        self.assertIn("--ouput: no such option; did you mean --output?",
+                      self.refuse("evaluate", "a.bag", "--ouput", "b"))
+        self.assertIn("--locliser: no such option; did you mean --localizer?",
+                      self.refuse("replay", "a.bag", "--locliser=ukf"))
+        said = self.refuse("simulate", "--scenario", "plaza", "--colour", "red")
+        self.assertIn("--colour: no such option\n", said)
+        self.assertIn("--help", said)
+
     def test_paper_experiment_refuses(self):
+        self.assertNotIn("(read:", self.refuse("paper_experiment", "--methods", "paper", "--set", "gps_bias.x=1"))
         self.assertIn("no such method", self.refuse("paper_experiment", "--methods", "papers"))
         output = self.refuse("paper_experiment", "--set", "particle_filter.expert.ring_share=2", "--set",
                              "gps_bias.expert.bias_filter.shadow_sigm=1")

@@ -108,6 +108,9 @@ class LocalizationPipeline {
   /// Sets the map frame's origin; the filter starts anew where it had another. Throws std::invalid_argument where there
   /// is no such place.
   void set_datum(const GeodeticPosition& datum);
+  /// Why somebody who asks for this datum cannot mean it: it is all 0, or so far from the robot that no fix would be
+  /// accepted any more; empty where nothing is known against it. Throws as set_datum() does.
+  std::string doubt_of_datum(const GeodeticPosition& datum) const;
   /// Sets the antenna's place in the base frame (m), e.g. as tf says it. Requires finite numbers.
   void set_antenna_offset(const Eigen::Vector2d& offset) { antenna_ = offset; }
 
