@@ -16,6 +16,8 @@ workspace=$root/.workspace
 build=$workspace/build
 devel=$workspace/devel
 log=$workspace/build.log
+# A shell that has read environment.sh knows this tree itself; what is installed must not name it.
+CMAKE_PREFIX_PATH=$(tr ':' '\n' <<< "$CMAKE_PREFIX_PATH" | { grep -vFx "$devel" || true; } | paste -sd: -)
 
 usage() { sed -n '2,/^set /{/^set /d;s/^# \{0,1\}//;p}' "$0"; }
 
