@@ -252,7 +252,7 @@ class TrackMap {
       const [, py] = this.pixel(0, y);
       context.moveTo(0, py);
       context.lineTo(width, py);
-      context.fillText(plain(y), 3, py - 3);
+      if (py > 28) context.fillText(plain(y), 3, py - 3);  // below "m north"
     }
     context.stroke();
     context.fillText("m east", width - 42, height - 5);

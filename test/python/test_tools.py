@@ -102,6 +102,13 @@ class ToolTest(unittest.TestCase):
             results.append(method)
         self.assertEqual(*results)
 
+    def test_what_a_receiver_leaves_out_is_said(self):
+        self.succeed("simulate", "--scenario", "building_pass", "--duration", 20, "--without-lidar", "--output",
+                     self.path("a.bag"))
+        said = self.succeed("replay", self.path("a.bag"), "--receiver", "ublox")
+        self.assertIn("left out: gps/velocity gps/satellites", said)
+        self.assertNotIn("left out: gps", self.succeed("replay", self.path("a.bag")))
+
     def test_misspelt_options_are_named(self):
         self.assertIn("--ouput: no such option; did you mean --output?",
                       self.refuse("evaluate", "a.bag", "--ouput", "b"))

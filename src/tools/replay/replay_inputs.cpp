@@ -90,6 +90,17 @@ void ReplayInputs::read_receiver() {
   } else if (options_.without_odometry) {
     recording_ = read_receiver_topics(*bag_, options_);
   }
+  if (has_driver) say_what_is_left_out();
+}
+
+/// Says on standard error which of the usual topics are not read beside a driver's.
+void ReplayInputs::say_what_is_left_out() const {
+  const std::string source = driver_ ? driver_->source() : recording_->source;
+  std::string names;
+  for (const std::string& name : {topics_.velocity, topics_.satellites}) {
+    if (bag_->count(name) > 0 && (source + " ").find(" " + name + " ") == std::string::npos) names += " " + name;
+  }
+  if (!names.empty()) std::cerr << "replay: taken from receiver " << source << "; left out:" << names << '\n';
 }
 
 void ReplayInputs::read_topics() {

@@ -53,6 +53,7 @@ class ReplayInputs {
   };
 
   void read_receiver();
+  void say_what_is_left_out() const;
   void read_topics();
   void require_topics() const;
   void require_clouds() const;
