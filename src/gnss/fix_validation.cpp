@@ -72,17 +72,6 @@ std::optional<Rejection> reject_stamp(Stamp stamp, std::optional<Stamp> last_sta
                    number(to_seconds(*last_stamp) - to_seconds(stamp)) + " s older than the last fix"};
 }
 
-std::optional<Rejection> reject_distance(const RawFix& raw, const LocalFrame& frame, double max_distance) {
-  // At the datum's height, so that a height above another reference than the ellipsoid does not count; and through the
-  // Earth, because the horizontal distance shrinks again towards the antipode.
-  const GeodeticPosition place{raw.position.latitude_deg, raw.position.longitude_deg, frame.datum().altitude_m};
-  const double distance = frame.to_local(place).norm();
-  if (distance <= max_distance) return std::nullopt;
-  return Rejection{FixDecision::kRejectedOutOfRange,
-                   with_hint(number(distance) + " m from the datum, farther than " + number(max_distance) + " m",
-                             hint_of_far_place(raw.position, frame, max_distance))};
-}
-
 /// The declared horizontal covariance as standard deviations and correlation, which neither overflow nor underflow.
 /// Nothing where it cannot be used.
 struct HorizontalCovariance {
@@ -178,9 +167,10 @@ ValidatedFix validate_fix(const RawFix& raw, const LocalFrame& frame, std::optio
     outcome = std::move(*rejected);
     return result;
   }
-  if (const auto rejection = reject_distance(raw, frame, parameters.max_distance_from_datum)) {
-    outcome.decision = rejection->decision;
-    outcome.reason = rejection->reason;
+  if (const auto reason = why_too_far(raw.position, frame, parameters.max_distance_from_datum, "datum");
+      !reason.empty()) {
+    outcome.decision = FixDecision::kRejectedOutOfRange;
+    outcome.reason = reason;
     return result;
   }
 

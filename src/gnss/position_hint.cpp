@@ -61,6 +61,20 @@ std::string hint_of_far_place(const GeodeticPosition& position, const LocalFrame
   return {};
 }
 
+std::string why_too_far(const GeodeticPosition& position, const LocalFrame& frame, double max_distance_m,
+                        const std::string& origin) {
+  // At the datum's height, so that a height above another reference than the ellipsoid does not count; and through the
+  // Earth, because the horizontal distance shrinks again towards the antipode.
+  const double distance_m =
+      frame.to_local({position.latitude_deg, position.longitude_deg, frame.datum().altitude_m}).norm();
+  if (distance_m <= max_distance_m) return {};
+  std::ostringstream text;
+  text << distance_m << " m from the " << origin << ", farther than " << max_distance_m << " m";
+  const std::string hint = hint_of_far_place(position, frame, max_distance_m);
+  if (!hint.empty()) text << ": " << hint;
+  return text.str();
+}
+
 bool looks_like_radians(const GeodeticPosition& position) {
   constexpr double kHalfTurn = 3.15;
   constexpr double kSimulated_deg = 0.1;

@@ -21,4 +21,16 @@ std::size_t edit_distance(const std::string& a, const std::string& b) {
   return row[b.size()];
 }
 
+std::optional<std::size_t> nearest_name(const std::string& name, const std::vector<std::string>& known) {
+  std::optional<std::size_t> nearest;
+  std::size_t least = 1 + name.size() / 3;
+  for (std::size_t i = 0; i < known.size(); ++i) {
+    const std::size_t distance = edit_distance(name, known[i]);
+    if (distance > least || (nearest && distance == least)) continue;
+    nearest = i;
+    least = distance;
+  }
+  return nearest;
+}
+
 }  // namespace urban_gnss

@@ -219,11 +219,11 @@ std::string ParameterReader::hint(const std::string& path) const {
       if (name == former && last_name(known) == now) return "; it is now " + known;
     }
   }
-  const auto nearest = std::min_element(known_.begin(), known_.end(), [&](const auto& a, const auto& b) {
-    return edit_distance(name, last_name(a)) < edit_distance(name, last_name(b));
-  });
-  const bool is_near = nearest != known_.end() && edit_distance(name, last_name(*nearest)) <= 1 + name.size() / 3;
-  return is_near ? "; did you mean " + *nearest + "?" : "";
+  const std::vector<std::string> paths(known_.begin(), known_.end());
+  std::vector<std::string> names;
+  for (const std::string& known : paths) names.push_back(last_name(known));
+  const auto nearest = nearest_name(name, names);
+  return nearest ? "; did you mean " + paths[*nearest] + "?" : "";
 }
 
 void ParameterReader::find_unknown(const YAML::Node& map, const std::string& prefix,

@@ -373,16 +373,8 @@ std::string LocalizationPipeline::doubt_of_datum(const GeodeticPosition& datum) 
   const LocalFrame asked(datum);
   if (!frame() || !initialized()) return {};
   const Eigen::Vector2d robot = localizer_->pose().position();
-  GeodeticPosition place = frame()->to_geodetic({robot.x(), robot.y(), 0.0});
-  place.altitude_m = datum.altitude_m;
-  const double limit_m = parameters_.input.fix_validation.max_distance_from_datum;
-  const double distance_m = asked.to_local(place).norm();
-  if (distance_m <= limit_m) return {};
-  std::ostringstream text;
-  text.precision(4);
-  text << distance_m << " m from the robot, farther than max_distance_from_datum (" << limit_m << " m)";
-  const std::string hint = hint_of_far_place(datum, LocalFrame(place), limit_m);
-  return hint.empty() ? text.str() : text.str() + "; " + hint;
+  return why_too_far(frame()->to_geodetic({robot.x(), robot.y(), 0.0}), asked,
+                     parameters_.input.fix_validation.max_distance_from_datum, "robot");
 }
 
 void LocalizationPipeline::start_from(const Start& start) {

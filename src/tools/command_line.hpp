@@ -118,15 +118,12 @@ class CommandLine {
       const std::string argument = argv[i];
       const std::string name = argument.substr(0, argument.find('='));
       if (name.rfind("--", 0) != 0 || app_.get_option_no_throw(name) != nullptr) continue;
-      std::string nearest;
+      std::vector<std::string> known;
       for (const CLI::Option* option : app_.get_options()) {
-        for (const std::string& known : option->get_lnames()) {
-          if (nearest.empty() || edit_distance(name, "--" + known) < edit_distance(name, nearest))
-            nearest = "--" + known;
-        }
+        for (const std::string& each : option->get_lnames()) known.push_back("--" + each);
       }
-      const bool is_near = edit_distance(name, nearest) <= 1 + name.size() / 3;
-      throw CLI::ExtrasError(name + ": no such option" + (is_near ? "; did you mean " + nearest + "?" : ""),
+      const auto nearest = nearest_name(name, known);
+      throw CLI::ExtrasError(name + ": no such option" + (nearest ? "; did you mean " + known[*nearest] + "?" : ""),
                              CLI::ExitCodes::ExtrasError);
     }
   }

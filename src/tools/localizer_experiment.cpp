@@ -216,11 +216,11 @@ void run_plain(const Options& options, const std::string& command, const std::ve
   };
   run_and_report(
       options, command, experiment, [&](const auto& drives) { return report_errors(contenders, drives); }, inputs);
-  std::cout
-      << "\nheading: root mean square; a consistent estimate has a NEES of 3, one that is too sure of itself more; coverage in %; diverged: drives with "
-         "an error beyond "
-      << kDiverged_m << " m; back after: s until the error was below " << kGoodFix_m
-      << " m again after an outage's first good fix, at worst\n";
+  std::cout << "\nheading: root mean square; a consistent estimate has a NEES of 3, one that is too sure of itself "
+               "more; coverage in %; diverged: drives with "
+               "an error beyond "
+            << kDiverged_m << " m; back after: s until the error was below " << kGoodFix_m
+            << " m again after an outage's first good fix, at worst\n";
 }
 
 void run_faults(const Options& options, const std::string& command, const std::vector<Contender>& contenders,

@@ -16,6 +16,11 @@ std::string hint_of_no_place(const GeodeticPosition& position);
 /// it is within it.
 std::string hint_of_far_place(const GeodeticPosition& position, const LocalFrame& frame, double max_distance_m);
 
+/// "2e+05 m from the datum, farther than 1e+05 m", with the hint above; empty where it is within the distance. `origin`
+/// is what the frame's datum is, for people. Heights do not count.
+std::string why_too_far(const GeodeticPosition& position, const LocalFrame& frame, double max_distance_m,
+                        const std::string& origin);
+
 /// Whether a place is likely to be one in radians: there is no land within 1.58 degrees of the equator and 3.15 of
 /// Greenwich. Simulated worlds about (0, 0) are not meant.
 bool looks_like_radians(const GeodeticPosition& position);
