@@ -40,7 +40,7 @@ LocalizerNode::LocalizerNode(ros::NodeHandle& node, ros::NodeHandle& private_nod
   serve(node, private_node);
   diagnostics_.setHardwareID("none");
   diagnostics_.add("localization", this, &LocalizerNode::diagnose);
-  second_timer_ = io_.every(node, 1.0, "the node's timer", [this] { every_second(); });
+  second_timer_ = io_.every(node, kStatusPeriod_s, "the node's timer", [this] { every_second(); });
   five_second_timer_ = io_.every(node, 5.0, "the node's timer", [this] { every_five_seconds(); });
   publish_results();
 }

@@ -12,6 +12,9 @@
 
 namespace urban_gnss {
 
+/// Without a fix, a status is published this often.
+constexpr double kStatusPeriod_s = 1.0;
+
 /// When a localizer is said to be well.
 struct StatusParameters {
   double fix_timeout{10.0};

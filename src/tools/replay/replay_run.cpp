@@ -200,10 +200,17 @@ void ReplayRun::settle() {
     ++decisions_[decision];
     if (is_rejected(outcome.decision)) rejections_.add(decision + ": " + outcome.reason);
   }
-  if (!bag_) return;
-  for (const auto& status : to_status_messages(pipeline_, outcomes, to_ros(newest_), shell_.frames.map)) {
-    write(topics::kStatus, newest_, status);
-  }
+  if (bag_) write_status(outcomes);
+}
+
+void ReplayRun::write_status(const std::vector<FixOutcome>& outcomes) {
+  const auto messages = to_status_messages(pipeline_, outcomes, to_ros(newest_), shell_.frames.map);
+  for (const auto& message : messages) write(topics::kStatus, newest_, message);
+  if (!messages.empty()) last_status_ = newest_;
+  if (std::chrono::abs(newest_ - last_status_) < from_seconds(kStatusPeriod_s)) return;
+  last_status_ = newest_;
+  write(topics::kStatus, newest_,
+        to_message(pipeline_.report(), pipeline_.localizer(), to_ros(newest_), shell_.frames.map));
 }
 
 void ReplayRun::take(const LocalizationOutput& output) {

@@ -85,6 +85,8 @@ class ReplayRun {
   double since_begin_s(const std::optional<Stamp>& stamp) const;
   void look_up_sensors();
   void print(const std::vector<PipelineEvent>& events);
+  /// Of each fix, and by the time, as the live node does: what was healthy may not be without a fix.
+  void write_status(const std::vector<FixOutcome>& outcomes);
   void write_biases(const std::vector<BiasEstimate>& biases);
   /// Once, and where it changes.
   void write_datum(Stamp stamp);
@@ -102,6 +104,7 @@ class ReplayRun {
   std::unique_ptr<OutputFile> tum_;
   bool has_truth_;
   Stamp newest_{0};
+  Stamp last_status_{0};
   std::optional<Stamp> begin_;  ///< of the first odometry
   std::optional<Stamp> first_estimate_;
   std::optional<Stamp> first_heading_;
