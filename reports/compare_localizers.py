@@ -22,8 +22,9 @@ sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import numpy as np  # noqa: E402
 
 import report_common as common  # noqa: E402
+from package_programs import program  # noqa: E402
 from recordings import (NEEDED, add_arguments, call, for_each_recording, make_bag, markdown,  # noqa: E402, F401
-                        program, replace_between, set_arguments, write_docs)
+                        replace_between, set_arguments, write_docs)
 from report_common import plt  # noqa: E402
 
 ESTIMATE = "odometry/filtered"

@@ -12,7 +12,8 @@ import numpy as np
 import rosbag
 
 import report_common as common
-from recordings import call, program
+from package_programs import program
+from recordings import call
 
 # Runs, by name: what tells replay to weigh fixes so.
 MODELS = {name: ("--set", "occlusion.model=" + name) for name in ("conventional", "paper", "soft")}

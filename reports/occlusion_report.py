@@ -18,6 +18,7 @@ import numpy as np  # noqa: E402
 
 import occlusion_bag  # noqa: E402
 import report_common as common  # noqa: E402
+from package_programs import program  # noqa: E402
 from report_common import plt  # noqa: E402
 
 SCENARIOS = ["campus_loop", "building_pass", "downtown_grid", "open_sky"]
@@ -53,9 +54,7 @@ TRAJECTORY_COLUMNS = ("t", "x", "y", "yaw")
 
 def run_experiment(out, options):
     """Run the program; exit with its last line where it fails."""
-    programs = os.environ.get("URBAN_GNSS_PROGRAMS")
-    name = "occlusion_experiment"
-    command = [os.path.join(programs, name)] if programs else ["rosrun", "urban_gnss_localization", name]
+    command = program("occlusion_experiment")
     command += ["--scenarios", ",".join(options.scenarios), "--seeds", str(options.seeds), "--first-seed",
                 str(options.first_seed), "--json", os.path.join(out, "metrics.json"), "--series",
                 os.path.join(out, "data")]

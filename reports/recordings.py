@@ -7,6 +7,7 @@ import subprocess
 import sys
 
 import report_common as common
+from package_programs import program
 
 NEEDED = ("gnss.csv", "odom.csv", "truth.csv", "meta.json")
 LONGEST_LINE = 120  # characters, in docs/
@@ -38,12 +39,6 @@ def for_each_recording(options, run):
             results[name] = future.result()
             print("{}/{} {}".format(done, len(names), name), file=sys.stderr)
     return results
-
-
-def program(name):
-    """The command that starts one of the package's programs."""
-    programs = os.environ.get("URBAN_GNSS_PROGRAMS")
-    return [os.path.join(programs, name)] if programs else ["rosrun", "urban_gnss_localization", name]
 
 
 def call(*command):

@@ -10,6 +10,8 @@ COLOURS = {"PASS": "\033[32m", "WARN": "\033[33m", "FAIL": "\033[31m"}
 FAMILIES = {"topics": "Topics", "stamps": "Stamps", "clocks": "Clocks", "frames": "Frames", "imu": "IMU",
             "odometry": "Odometry", "velocity": "Velocity of the receiver", "fix": "Fixes", "covariance": "Covariance",
             "antenna": "Antenna", "satellites": "Satellites"}
+# What a recording cannot do without, though it may be elsewhere.
+MISSING = {"topics.odometry": "no odometry", "topics.fix": "no fixes"}
 
 
 def lines_of(recording, findings, coloured=False, quiet=False):
@@ -41,7 +43,10 @@ def summary(findings):
     numbers = count(findings)
     text = "{} FAIL, {} WARN, {} PASS".format(numbers["FAIL"], numbers["WARN"], numbers["PASS"])
     failed = [finding.check for finding in findings if finding.level == FAIL]
-    return "summary: " + text + (": " + ", ".join(dict.fromkeys(failed)) if failed else "")
+    missing = [MISSING[finding.check] for finding in findings if finding.check in MISSING and
+               finding.level != FAIL and finding.values.get("is_missing")]
+    return ("summary: " + text + (": " + ", ".join(dict.fromkeys(failed)) if failed else "") +
+            ("; " + " and ".join(missing) + " in it" if missing else ""))
 
 
 def plain(value):

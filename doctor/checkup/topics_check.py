@@ -86,8 +86,8 @@ def missing(recording, kind, topic):
         finding = failed if recording.is_live or not recording.streams() else warned
         text = ("no fixes: {}; without them nothing is localized" if kind == "fix" else
                 "no odometry: {}; a localizer needs it, or replay --odom none").format(what)
-        return finding(name, text,
-                       "localization.launch " + preset if preset else available(recording))
+        return finding(name, text, "localization.launch " + preset if preset else available(recording),
+                       is_missing=preset is None)
     if kind == "imu" or preset_of(recording) is None:
         return warned(name, "{}: {}; with it {}".format(NAMES[kind], what, BETTER_WITH[kind]),
                       "localization.launch {}:=TOPIC, if the robot has one".format(LAUNCH_ARGUMENTS[kind]))

@@ -4,6 +4,8 @@
 #include <iterator>
 #include <stdexcept>
 
+#include "urban_gnss_localization/common/edit_distance.hpp"
+
 // Every localizer of the package, a line each. A folder below localizers/ provides `LocalizerEntry NAME_entry()`;
 // CMakeLists.txt reads these lines, too, and builds the node NAME_node.
 #define URBAN_GNSS_LOCALIZERS(X) \
@@ -36,7 +38,7 @@ std::string LocalizerRegistry::names() const {
 const LocalizerEntry& LocalizerRegistry::find(const std::string& name) const {
   const auto found =
       std::find_if(entries_.begin(), entries_.end(), [&](const auto& each) { return each.name == name; });
-  if (found == entries_.end()) throw std::runtime_error(name + ": no such localizer; there are " + names());
+  if (found == entries_.end()) throw std::runtime_error(name + ": no such localizer; " + guess(name) + "there are " + names());
   return *found;
 }
 
@@ -47,8 +49,18 @@ LocalizerChoice LocalizerRegistry::choose(const std::string& name) const {
       if (variant.name == name) return {&entry, variant.assignments};
     }
   }
-  throw std::runtime_error(name + ": no such localizer; there are " + names() + ", in comparisons also as " +
-                           variant_names());
+  throw std::runtime_error(name + ": no such localizer; " + guess(name) + "there are " + names() +
+                           ", in comparisons also as " + variant_names());
+}
+
+std::string LocalizerRegistry::guess(const std::string& name) const {
+  std::vector<std::string> known;
+  for (const LocalizerEntry& entry : entries_) {
+    known.push_back(entry.name);
+    for (const LocalizerVariant& variant : entry.variants) known.push_back(variant.name);
+  }
+  const auto nearest = nearest_name(name, known);
+  return nearest ? "did you mean " + known[*nearest] + "? Else " : "";
 }
 
 std::vector<LocalizerVariant> LocalizerRegistry::variants(bool on_request) const {

@@ -5,7 +5,7 @@
 #include <optional>
 #include <utility>
 
-#include "urban_gnss_localization/parameters/edit_distance.hpp"
+#include "urban_gnss_localization/common/edit_distance.hpp"
 
 namespace urban_gnss {
 namespace {

@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "urban_gnss_localization/parameters/assignment.hpp"
-#include "urban_gnss_localization/parameters/edit_distance.hpp"
+#include "urban_gnss_localization/common/edit_distance.hpp"
 
 namespace urban_gnss {
 namespace {
@@ -69,7 +69,7 @@ ParamsFile look_through_params(const YAML::Node& file, const std::vector<std::st
       std::any_of(nodes.begin(), nodes.end(), [&](const auto& node) { return holds_section(file, node); });
   if (found.faults.empty() && !has_section) {
     found.hint = "has no section " + nodes.front() + (sections.empty() ? "" : ", but " + sections) +
-                 ": this node takes nothing from it";
+                 ": nothing is taken from it";
   }
   return found;
 }

@@ -16,7 +16,7 @@
 #include "files/input_files.hpp"
 #include "urban_gnss_localization/common/parameters.hpp"
 #include "urban_gnss_localization/common/pending_file.hpp"
-#include "urban_gnss_localization/parameters/edit_distance.hpp"
+#include "urban_gnss_localization/common/edit_distance.hpp"
 
 namespace urban_gnss {
 

@@ -8,6 +8,7 @@
 
 #include "command_line.hpp"
 #include "files/output_file.hpp"
+#include "params_check.hpp"
 #include "urban_gnss_localization/localizers/registry.hpp"
 #include "urban_gnss_localization/parameters/parameter_list.hpp"
 #include "urban_gnss_localization/ros/comparison_node_parameters.hpp"
@@ -131,16 +132,27 @@ void check_pages(const fs::path& directory) {
   if (!stale.empty()) throw std::runtime_error("stale, renew by `parameters --write DIR`:" + stale);
 }
 
+/// What the nodes would read of a file, or all that they would refuse.
+void read_file(const std::string& file) {
+  const ParamsCheck check = check_params(file, standard_localizers());
+  if (!check.faults.empty()) throw ParameterError(file, check.faults);
+  if (!check.hint.empty()) std::cerr << check.hint << '\n';
+  for (const std::string& section : check.sections) std::cout << file << ": section " << section << " can be read\n";
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   std::string write_directory;
   std::string check_directory;
+  std::string params;
   CommandLine line("parameters", "Prints the parameters of every node: place, default, unit, range, meaning.");
   line.add_output_folder("--write", write_directory,
                         "renew config/*.yaml and docs/parameters.md below this folder, the package's");
   line.app().add_option("--check", check_directory, "fail where one of these files is stale");
+  line.app().add_option("--params", params, "read a file of params:= as the nodes would, and say what they would refuse");
   return line.run(argc, argv, [&] {
+    if (!params.empty()) return read_file(params);
     if (!write_directory.empty()) write_pages(write_directory);
     if (!check_directory.empty()) check_pages(check_directory);
     if (write_directory.empty() && check_directory.empty()) std::cout << all_pages(standard_localizers()).back().text;

@@ -52,7 +52,7 @@ TEST(ParamsFile, OfSeveralNodesOneSectionIsEnough) {
 TEST(ParamsFile, OneThatIsOfOtherNodesIsAHint) {
   const auto found = look("{ukf: {direct_sigma: 4}, imm: {}}");
   EXPECT_TRUE(found.faults.empty());
-  EXPECT_EQ(found.hint, "has no section imm_ekf, but ukf, imm: this node takes nothing from it");
+  EXPECT_EQ(found.hint, "has no section imm_ekf, but ukf, imm: nothing is taken from it");
 }
 
 struct WithList {

@@ -104,24 +104,24 @@ def write_bag(path, recording):
         message.header.frame_id = FRAMES[kind]
         messages.append((one.received[k], TOPICS[kind], message))
 
-    for k in range(len(recording.odometry)):
+    for k in range(len(recording.odometry or ())):
         one, message = recording.odometry, Odometry(child_frame_id="base_link")
         message.pose.pose.position.x, message.pose.pose.position.y = one.x[k], one.y[k]
         q = message.pose.pose.orientation
         q.z, q.w = math.sin(0.5 * one.yaw[k]), math.cos(0.5 * one.yaw[k])
         message.twist.twist.linear.x, message.twist.twist.angular.z = one.vx[k], one.wz[k]
         add("odometry", one, k, message)
-    for k in range(len(recording.imu)):
+    for k in range(len(recording.imu or ())):
         message = Imu()
         message.angular_velocity.z, message.linear_acceleration.z = recording.imu.wz[k], recording.imu.az[k]
         message.orientation_covariance[0] = -1.0
         add("imu", recording.imu, k, message)
-    for k in range(len(recording.fix)):
+    for k in range(len(recording.fix or ())):
         one = recording.fix
         message = NavSatFix(latitude=one.lat[k], longitude=one.lon[k], altitude=500.0, position_covariance_type=2)
         message.position_covariance = [one.cov_xx[k], 0.0, 0.0, 0.0, one.cov_yy[k], 0.0, 0.0, 0.0, one.cov_zz[k]]
         add("fix", one, k, message)
-    for k in range(len(recording.velocity)):
+    for k in range(len(recording.velocity or ())):
         message = TwistWithCovarianceStamped()
         message.twist.twist.linear.x, message.twist.twist.linear.y = recording.velocity.vx[k], recording.velocity.vy[k]
         add("velocity", recording.velocity, k, message)

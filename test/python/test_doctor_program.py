@@ -65,6 +65,38 @@ class ProgramTest(unittest.TestCase):
             self.assertEqual(2, done.returncode, arguments)
             self.assertNotIn("Traceback", done.stderr)
 
+    def test_params_that_no_node_would_take(self):
+        """As the nodes and replay read them: values, names, sections, and what stands in none."""
+        for text, words in (("imm_ekf: {fix_sigma_default: -4.0}", "fix_sigma_default = -4: must be"),
+                            ("occlusion: {antenna_ofset: [0, 0, 1]}", "did you mean antenna_offset"),
+                            ("imm_ekf: {antenna_offset: 3}", "imm_ekf.antenna_offset"),
+                            ("robot1: {ukf: {odom_frame: [1]}}", "robot1/ukf.odom_frame"),
+                            ("im_ekf: {}", "did you mean imm_ekf?"), ("antenna_offset: [1, 2]", "outside of a section"),
+                            ("imm_ekf:", "imm_ekf is empty"), ("[1]", "must be a map"), ("a: [", "p.yaml"),
+                            (b"imm_ekf: {map_frame: \xff\xfe}", "p.yaml")):
+            with open(os.path.join(self.folder.name, "p.yaml"), "wb") as stream_of:
+                stream_of.write(text if isinstance(text, bytes) else text.encode())
+            done = self.run_doctor("drive.bag", "--params", "p.yaml")
+            self.assertEqual(2, done.returncode, done.stdout)
+            self.assertIn(words, done.stderr)
+            self.assertTrue(done.stderr.startswith("doctor: p.yaml"), done.stderr)
+            self.assertNotIn("Traceback", done.stderr)
+
+    def test_params_without_a_section(self):
+        with open(os.path.join(self.folder.name, "p.yaml"), "w", encoding="utf-8") as stream_of:
+            stream_of.write("my_driver: {rate: 5}")
+        done = self.run_doctor("drive.bag", "--params", "p.yaml")
+        self.assertEqual(0, done.returncode, done.stdout + done.stderr)
+        self.assertIn("has no section imm_ekf, but my_driver", done.stderr)
+
+    def test_a_bag_without_fixes_says_so_in_its_last_line(self):
+        for parts, words in ((("odometry", "imu"), "; no fixes in it"), (("fix", "velocity"), "; no odometry in it"),
+                             (("imu",), "; no odometry and no fixes in it")):
+            write_bag(os.path.join(self.folder.name, "part.bag"), drive(seconds=20.0, parts=parts))
+            done = self.run_doctor("part.bag", "--quiet")
+            self.assertEqual(0, done.returncode, done.stdout)
+            self.assertTrue(done.stdout.splitlines()[-1].endswith(words), done.stdout)
+
     def test_topics_that_are_asked_for(self):
         done = self.run_doctor("drive.bag", "--fix-topic", "other", "--odom-topic", "/imu/data")
         self.assertEqual(1, done.returncode)

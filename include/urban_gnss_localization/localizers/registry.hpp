@@ -7,6 +7,9 @@
 
 namespace urban_gnss {
 
+/// The name of the localizer that serves where nobody chooses.
+inline constexpr char kDefaultLocalizer[] = "imm_ekf";
+
 /// A localizer with what is set of its parameters.
 struct LocalizerChoice {
   const LocalizerEntry* entry;
@@ -32,6 +35,9 @@ class LocalizerRegistry {
   std::string variant_names() const;
 
  private:
+  /// "did you mean ukf? Else "; empty where no name is near.
+  std::string guess(const std::string& name) const;
+
   std::vector<LocalizerEntry> entries_;
 };
 

@@ -241,7 +241,15 @@ int replay_main(int argc, char** argv, const LocalizerRegistry& localizers) {
   std::string odometry = "topic";
   app.add_flag("--list-variants", only_names, "print the names under which localizers are compared, and end");
   app.add_option("--localizer", options.localizer,
-                 localizers.names() + "; in comparisons also as " + localizers.variant_names());
+                 localizers.names() + "; in comparisons also as " + localizers.variant_names())
+      ->check([&localizers](const std::string& name) {
+        try {
+          localizers.choose(name);
+        } catch (const std::runtime_error& error) {
+          return std::string(error.what());
+        }
+        return std::string();
+      });
   app.add_option("--robot", options.robot, "differential, ackermann, holonomic or car: what is known of its wheels");
   app.add_option("--params", options.params,
                  "YAML with a section for each node, as for localization.launch; repeatable, later files win");

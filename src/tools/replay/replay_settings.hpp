@@ -19,7 +19,7 @@ inline constexpr char kTf[] = "tf";
 /// What the command line says.
 struct ReplayOptions {
   std::vector<std::string> bags;  ///< of one recording
-  std::string localizer = "imm_ekf";
+  std::string localizer = kDefaultLocalizer;
   std::string robot;  ///< a file of config/robots; empty: the defaults, which are those of `differential`
   std::vector<std::string> params;
   std::vector<std::string> overrides;

@@ -1,4 +1,4 @@
-#include "urban_gnss_localization/parameters/edit_distance.hpp"
+#include "urban_gnss_localization/common/edit_distance.hpp"
 
 #include <algorithm>
 #include <numeric>

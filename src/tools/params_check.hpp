@@ -1,0 +1,86 @@
+#pragma once
+
+#include <algorithm>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "urban_gnss_localization/localizers/registry.hpp"
+#include "urban_gnss_localization/parameters/assignment.hpp"
+#include "urban_gnss_localization/parameters/parameter_reader.hpp"
+#include "urban_gnss_localization/parameters/params_file.hpp"
+#include "urban_gnss_localization/ros/comparison_node_parameters.hpp"
+#include "urban_gnss_localization/ros/gps_bias_node_parameters.hpp"
+#include "urban_gnss_localization/ros/gpsd_node_parameters.hpp"
+#include "urban_gnss_localization/ros/occlusion_node.hpp"
+#include "urban_gnss_localization/ros/receiver_node_parameters.hpp"
+#include "urban_gnss_localization/ros/registered_localizer_node.hpp"
+#include "urban_gnss_localization/ros/state_keeper.hpp"
+#include "urban_gnss_localization/ros/waypoint_controller_node_parameters.hpp"
+
+/// A file of `params:=` as the nodes would read it, without a node.
+namespace urban_gnss {
+
+/// What became of such a file.
+struct ParamsCheck {
+  std::vector<std::string> sections;  ///< that are read, by their places in the file
+  std::vector<std::string> faults;    ///< each with file and line, as far as they are known
+  std::string hint;                   ///< where nothing of the file is read
+};
+
+/// The sections of a node: in the file itself, in a namespace, or under a name with slashes.
+inline std::vector<std::pair<std::string, YAML::Node>> find_sections(const YAML::Node& map, const std::string& node,
+                                                                     const std::string& path = "") {
+  std::vector<std::pair<std::string, YAML::Node>> found;
+  if (!map.IsMap()) return found;
+  for (const auto& entry : map) {
+    const std::string name = entry.first.as<std::string>("");
+    const std::string last = name.substr(name.rfind('/') + 1);
+    if (last == node) {
+      found.emplace_back(path + name, entry.second);
+    } else if (last != "expert") {  // its groups are called as some nodes are
+      const auto below = find_sections(entry.second, node, path + name + "/");
+      found.insert(found.end(), below.begin(), below.end());
+    }
+  }
+  return found;
+}
+
+/// Reads the sections of one node into its struct.
+template <class P>
+void check_sections(const std::string& file, const YAML::Node& content, const std::string& node, const P& defaults,
+                    ParamsCheck& check) {
+  for (const auto& [path, section] : find_sections(content, node)) {
+    check.sections.push_back(path);
+    P parameters = defaults;
+    ParameterReader reader(section, file, path + ".", Layout::kTiered);
+    for (const char* other : {"diagnostic_period", "params_file", kStateFile}) reader.ignore(other);
+    const std::vector<std::string> faults = reader.read(parameters).finish();
+    check.faults.insert(check.faults.end(), faults.begin(), faults.end());
+  }
+}
+
+/// Throws std::runtime_error where the file cannot be read or is no map.
+inline ParamsCheck check_params(const std::string& file, const LocalizerRegistry& localizers) {
+  ParamsCheck check;
+  const YAML::Node content = load_map(file);
+  for (const LocalizerEntry& entry : localizers.entries()) {
+    check_sections(file, content, entry.name, LocalizerNodeSettings(entry), check);
+  }
+  // A name outside of a section is meant for a localizer: the first that the file has, or the default.
+  std::vector<std::string> nodes = {check.sections.empty() ? kDefaultLocalizer : check.sections.front()};
+  check_sections(file, content, "gps_bias", GpsBiasNodeParameters(), check);
+  check_sections(file, content, "occlusion", OcclusionNodeSettings(), check);
+  check_sections(file, content, "waypoint_controller", WaypointControllerNodeParameters(), check);
+  check_sections(file, content, "comparison", ComparisonNodeParameters(), check);
+  check_sections(file, content, "receiver", ReceiverNodeParameters(), check);
+  check_sections(file, content, "gpsd", GpsdNodeParameters(), check);
+  for (const char* node : {"gps_bias", "occlusion"}) nodes.push_back(node);
+  for (const std::string& path : check.sections) nodes.push_back(path.substr(path.rfind('/') + 1));
+  const ParamsFile found = read_params_file(file, nodes);
+  check.faults.insert(check.faults.begin(), found.faults.begin(), found.faults.end());
+  if (check.sections.empty()) check.hint = found.hint;
+  return check;
+}
+
+}  // namespace urban_gnss
