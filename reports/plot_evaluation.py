@@ -310,9 +310,9 @@ def add_tables(page, runs, colours):
 
 
 def read_tracks(directory, metrics):
-    """What the page draws of each track, in the order of metrics.json."""
+    """What the page draws of each track, in the order in which `evaluate` was given them."""
     return [track_view.read_track(os.path.join(directory, "data", "track_" + name.replace("/", "_") + ".json"))
-            for name in metrics.get("tracks", {})]
+            for name in metrics.get("order", metrics.get("tracks", {}))]
 
 
 # Quantity, keys, digits, factor.
@@ -392,7 +392,7 @@ def make_report(directory):
         add_track_part(page, tracks, metrics, colours)
     if runs:
         add_error_part(page, runs, colours, output)
-    page.provenance(metrics, without=("runs", "tracks"))
+    page.provenance(metrics, without=("runs", "tracks", "order"))
     page.save(output("report.html"))
     return output("report.html")
 

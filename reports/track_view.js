@@ -555,6 +555,8 @@ function addControls(parent, view, map) {
       label.appendChild(document.createTextNode(` ${decision} ${count}`));
     }
     if (!Object.keys(counts).length) legend.textContent = "No fixes.";
+    const missing = view.chosen.fixes_without_position;
+    if (missing) element(legend, "span", `${missing} without a position are not drawn`, { className: "entry" });
   };
   addLegend();
 }

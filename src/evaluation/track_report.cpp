@@ -192,6 +192,7 @@ nlohmann::json to_json(const TrackReport& report, const TrackSummary& summary, s
   const auto error_of = [](const ErrorSample& sample) { return rounded(sample.position_error_m); };
   nlohmann::json json = {
       {"name", report.name},
+      {"fixes_without_position", report.fixes_without_position},
       {"localizer", report.localizer},
       {"start", to_seconds(start)},
       {"estimate",

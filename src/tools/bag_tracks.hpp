@@ -66,15 +66,21 @@ inline std::optional<LocalFrame> read_datum(const BagReader& bag) {
   return frame;
 }
 
-/// The fixes as poses without a yaw; those without a position are left out.
-inline Trajectory read_fixes(const BagReader& bag, const std::string& topic, const LocalFrame& frame) {
-  Trajectory fixes;
+struct FixTrack {
+  Trajectory fixes;  ///< as poses without a yaw
+  std::size_t without_position{0};
+};
+
+inline FixTrack read_fixes(const BagReader& bag, const std::string& topic, const LocalFrame& frame) {
+  FixTrack track;
   for_each_message<sensor_msgs::NavSatFix>(bag, topic, [&](const sensor_msgs::NavSatFix& fix) {
+    ++track.without_position;
     if (fix.status.status < sensor_msgs::NavSatStatus::STATUS_FIX) return;
     // A fix without a height is still a horizontal fix.
     const double altitude = std::isfinite(fix.altitude) ? fix.altitude : frame.datum().altitude_m;
     const Eigen::Vector3d local = frame.to_local({fix.latitude, fix.longitude, altitude});
     if (!local.allFinite()) return;
+    --track.without_position;
     TimedPose pose;
     pose.stamp = to_stamp(fix.header.stamp);
     pose.pose = {local.x(), local.y(), std::numeric_limits<double>::quiet_NaN()};
@@ -82,10 +88,10 @@ inline Trajectory read_fixes(const BagReader& bag, const std::string& topic, con
       pose.covariance.topLeftCorner<2, 2>() << fix.position_covariance[0], fix.position_covariance[1],
           fix.position_covariance[3], fix.position_covariance[4];
     }
-    fixes.push_back(pose);
+    track.fixes.push_back(pose);
   });
-  sort_by_stamp(fixes);
-  return fixes;
+  sort_by_stamp(track.fixes);
+  return track;
 }
 
 /// The namespace `levels` above a topic, with its slash at the end: "a/b/c" has "a/b/", "a/" and "" above it.

@@ -157,7 +157,7 @@ struct Drive {
   std::string stem;
   std::optional<OdometryTrack> truth;
   std::optional<urban_gnss::LocalFrame> map;
-  Trajectory fixes;
+  urban_gnss::FixTrack fixes;
 };
 
 Drive read_drive(const std::string& path, const BagReader& bag, const BagReader& truth_bag, const Options& options) {
@@ -196,7 +196,8 @@ std::optional<TrackReport> read_report(const BagReader& bag, const Drive& drive,
   report.estimate = std::move(estimate->trajectory);
   report.speeds_mps = std::move(estimate->speeds_mps);
   report.states = std::move(status.states);
-  for (const TimedPose& pose : drive.fixes) {
+  report.fixes_without_position = drive.fixes.without_position;
+  for (const TimedPose& pose : drive.fixes.fixes) {
     urban_gnss::DecidedFix fix{pose.stamp, pose.pose.position(), urban_gnss::position_sigma_m(pose.covariance), {}};
     const auto outcome = status.outcomes.find(pose.stamp);
     if (outcome != status.outcomes.end()) fix.outcome = outcome->second;
@@ -227,7 +228,9 @@ void evaluate_bag(const std::string& path, const BagReader& bag, const BagReader
                   const InputFiles& inputs, Results& results) {
   const Drive drive = read_drive(path, bag, truth_bag, options);
   std::optional<TrajectoryErrors> fixes;
-  if (drive.truth && !drive.fixes.empty()) fixes = urban_gnss::errors_at_fixes(drive.truth->trajectory, drive.fixes);
+  if (drive.truth && !drive.fixes.fixes.empty()) {
+    fixes = urban_gnss::errors_at_fixes(drive.truth->trajectory, drive.fixes.fixes);
+  }
   std::vector<Run> runs;
   std::vector<TrackReport> reports;
   for (const std::string& topic : find_estimate_topics(bag, options)) {
@@ -319,7 +322,9 @@ void print_track(std::ostream& out, const TrackReport& report, const TrackSummar
       << summary.distance_m << " m\n  claimed sigma: median " << std::setprecision(2) << summary.sigma_m.median
       << " m, 95 % " << summary.sigma_m.p95 << " m; speed: mean " << summary.speed_mps.mean << " m/s, max "
       << summary.speed_mps.max << " m/s; gaps: " << describe(summary.gaps, start) << '\n';
-  out << "  " << summary.fixes << " fixes:";
+  out << "  " << summary.fixes << " fixes";
+  if (report.fixes_without_position > 0) out << " and " << report.fixes_without_position << " without a position";
+  out << ':';
   for (const auto& [decision, count] : summary.decisions) out << "  " << decision << ' ' << count;
   out << "\n  without a fix that was used: " << describe(summary.gaps_of_fixes, start) << '\n';
   urban_gnss::TextCounts rejections;
@@ -349,6 +354,7 @@ void write_folder(const Results& results, const std::string& command, const Opti
   const fs::path output(options.output);
   nlohmann::json metrics = {
       {"command", command}, {"runs", nlohmann::json::object()}, {"tracks", nlohmann::json::object()}};
+  for (const TrackReport& report : results.reports) metrics["order"].push_back(report.name);
   for (const Run& run : results.runs) metrics["runs"][run.name] = urban_gnss::to_json(run.errors.summary);
   for (std::size_t i = 0; i < results.reports.size(); ++i) {
     const TrackReport& report = results.reports[i];

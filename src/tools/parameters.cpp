@@ -150,7 +150,7 @@ int main(int argc, char** argv) {
   line.add_output_folder("--write", write_directory,
                         "renew config/*.yaml and docs/parameters.md below this folder, the package's");
   line.app().add_option("--check", check_directory, "fail where one of these files is stale");
-  line.app().add_option("--params", params, "read a file of params:= as the nodes would, and say what they would refuse");
+  line.app().add_option("--params", params, "read a file of params:= as the nodes do, and say what they would refuse");
   return line.run(argc, argv, [&] {
     if (!params.empty()) return read_file(params);
     if (!write_directory.empty()) write_pages(write_directory);

@@ -84,9 +84,12 @@ class LaunchFilesTest(unittest.TestCase):
             self.assertIn("/occlusion/imm_ekf/expert/fix_delay: 0.25", said("occlusion.launch", "params:=mine.yaml"))
             for launch in ("localization.launch", "occlusion.launch"):
                 self.assertIn("file does not exist [{}/no.yaml]".format(folder), said(launch, "params:=no.yaml"))
-            player = said("replay.launch", "bag:=a.bag b.bag /c.bag", option="--args player")
+            self.assertIn("ls: cannot access 'no.bag': No such file", said("replay.launch", "bag:=no.bag"))
+            for name in ("a.bag", "b.bag", "c.bag"):
+                open(os.path.join(folder, name), "w", encoding="utf-8").close()
+            player = said("replay.launch", "bag:=a.bag b.bag {}/c.bag".format(folder), option="--args player")
             self.assertIn("env --chdir={} ".format(folder), player)
-            self.assertIn(" --bags a.bag b.bag /c.bag --topics ", player)
+            self.assertIn(" --bags a.bag b.bag {}/c.bag --topics ".format(folder), player)
 
 
 if __name__ == "__main__":

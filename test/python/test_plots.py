@@ -148,6 +148,7 @@ def write_track_input(directory, runs=None):
     metrics_path = os.path.join(directory, "metrics.json")
     metrics = json.loads(read_text(metrics_path)) if os.path.exists(metrics_path) else {"command": "evaluate"}
     metrics["runs"] = metrics.get("runs", {}) if runs is None else runs
+    metrics["order"] = ["town/switching"]
     metrics["tracks"] = {"town/switching": {
         "duration_s": 2.0, "longest_gap_of_fixes_s": 12.5, "sigma_m": {"median": None},
         "decisions": {"accepted": 2, "inflated": 1, "rejected_gate": 1, "unknown": 4}}}

@@ -177,6 +177,7 @@ class ToolTest(unittest.TestCase):
         self.assertAlmostEqual(track["speed_mps"]["median"], 3.0, delta=0.3)
         with open(self.path("report", "report.html"), encoding="utf-8") as file:
             self.assertIn("drawTracks(", file.read())
+        self.assertEqual(metrics["order"], ["out/odometry/filtered"])
         with open(self.path("out.geojson")) as file:
             features = json.load(file)["features"]
         self.assertEqual([each["properties"]["kind"] for each in features], ["estimate"] + 52 * ["fix"])
@@ -194,6 +195,20 @@ class ToolTest(unittest.TestCase):
         self.assertIn("none of the topics to evaluate is in it",
                       self.refuse("evaluate", self.path("in.bag"), "--estimate-topic", "x", "--gpx", self.path("x"),
                                   "--fix-topic", "none"))
+
+    def test_fixes_without_a_position_are_counted(self):
+        write_recording(self.directory)
+        self.succeed("csv_to_bag", self.directory, self.path("good.bag"))
+        with rosbag.Bag(self.path("good.bag")) as good, rosbag.Bag(self.path("in.bag"), "w") as bag:
+            for topic, message, time in good:
+                if topic.endswith("gps/fix") and 5020.5 < time.to_sec() < 5024.5:
+                    message.status.status = -1
+                bag.write(topic, message, time)
+        self.succeed("replay", self.path("in.bag"), "--output", self.path("out.bag"))
+        said = self.succeed("evaluate", self.path("out.bag"), "--output", self.path("report"))
+        self.assertIn("  48 fixes and 4 without a position:", said)
+        with open(self.path("report", "data", "track_out_odometry_filtered.json")) as file:
+            self.assertEqual(json.load(file)["fixes_without_position"], 4)
 
     def test_without_a_fix_it_is_not_healthy(self):
         """The states of a replay follow the time, as a live node's do, and not the fixes alone."""

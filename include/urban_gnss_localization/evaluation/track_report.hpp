@@ -45,6 +45,7 @@ struct TrackReport {
   Trajectory estimate;
   std::vector<double> speeds_mps;  ///< of the estimate's poses; NaN where none is known
   std::vector<DecidedFix> fixes;
+  std::size_t fixes_without_position{0};  ///< what the receiver sent beside them
   std::vector<StatedState> states;
   Trajectory truth;
   std::vector<ErrorSample> errors;      ///< of the estimate
