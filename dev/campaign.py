@@ -1,15 +1,14 @@
 """What the two campaigns share: how a program of the package is started, its limits, the table of what came of it."""
 import os
 import resource
+import sys
 
 ROOT = os.path.dirname(os.path.dirname(os.path.realpath(__file__)))
+sys.path.append(os.path.join(ROOT, "reports"))
+
+from package_programs import program  # noqa: E402, F401
+
 MOST_MEMORY = 4 << 30  # bytes of address space: more is a refusal to allocate, not a swapping machine
-
-
-def program(name):
-    """The command that starts one of the package's programs."""
-    programs = os.environ.get("URBAN_GNSS_PROGRAMS")
-    return [os.path.join(programs, name)] if programs else ["rosrun", "urban_gnss_localization", name]
 
 
 def limit_memory():

@@ -8,10 +8,19 @@ DEFAULTS = Setup("map", "odom", "base_link", (0.0, 0.0), False, "imm_ekf")
 LOCALIZERS = ("imm_ekf", "switching_particle_filter", "ukf", "complementary_ekf", "particle_filter")
 
 
+def sections(content):
+    """Name and values of the sections for localizers, also of those in namespaces and under names with slashes."""
+    for path, values in content.items():
+        name = str(path).split("/")[-1]
+        if name in LOCALIZERS:
+            yield name, values
+        elif isinstance(values, dict) and name != "expert":
+            yield from sections(values)
+
+
 def setup_of(content):
-    """The Setup of a params file that the nodes would take, with a section for each."""
-    section = next((name for name in LOCALIZERS if name in content), None)
-    values = content[section] if section else {}
+    """The Setup of a params file that the nodes would take: of its first section for a localizer."""
+    section, values = next(sections(content), (None, {}))
     changes = {"section": section or DEFAULTS.section}
     for name in ("map_frame", "odom_frame", "base_link_frame"):
         if name in values:

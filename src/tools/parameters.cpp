@@ -8,16 +8,11 @@
 
 #include "command_line.hpp"
 #include "files/output_file.hpp"
+#include "other_nodes.hpp"
 #include "params_check.hpp"
 #include "urban_gnss_localization/localizers/registry.hpp"
 #include "urban_gnss_localization/parameters/parameter_list.hpp"
-#include "urban_gnss_localization/ros/comparison_node_parameters.hpp"
-#include "urban_gnss_localization/ros/gps_bias_node_parameters.hpp"
-#include "urban_gnss_localization/ros/gpsd_node_parameters.hpp"
-#include "urban_gnss_localization/ros/occlusion_node.hpp"
-#include "urban_gnss_localization/ros/receiver_node_parameters.hpp"
 #include "urban_gnss_localization/ros/registered_localizer_node.hpp"
-#include "urban_gnss_localization/ros/waypoint_controller_node_parameters.hpp"
 
 using namespace urban_gnss;
 
@@ -94,23 +89,11 @@ std::vector<Page> all_pages(const LocalizerRegistry& localizers) {
   for (const LocalizerEntry& entry : localizers.entries()) {
     document(entry.name + "_node", entry.summary, ParameterList().add(LocalizerNodeSettings(entry)));
   }
-  const auto node = [&](const std::string& name, const std::string& summary, const ParameterList& list) {
+  for_each_other_node([&](const std::string& name, const std::string& summary, const auto& parameters) {
+    const ParameterList list = ParameterList().add(parameters);
     pages.push_back(yaml_page(name, name + "_node. " + summary, list));
     document(name + "_node", summary, list);
-  };
-  node("gps_bias",
-       "The bias filter of Nishida et al. What it shares with the localizer has the same name and place there.",
-       ParameterList().add(GpsBiasNodeParameters()));
-  node("occlusion", "Covariances of fixes by ray traces to the satellites, Maier and Kleiner.",
-       ParameterList().add(OcclusionNodeSettings()));
-  node("waypoint_controller", "The steering law of Nishida et al., eq. (36) to (38).",
-       ParameterList().add(WaypointControllerNodeParameters()));
-  node("comparison", "Plots the errors of several localizers, where there is a ground truth (comparison.launch).",
-       ParameterList().add(ComparisonNodeParameters()));
-  node("receiver", "Fixes, velocities and satellites from the messages of a receiver's driver (docs/receivers.md).",
-       ParameterList().add(ReceiverNodeParameters()));
-  node("gpsd", "Fixes, velocities and satellites from gpsd (docs/receivers/gpsd.md).",
-       ParameterList().add(GpsdNodeParameters()));
+  });
   pages.push_back({"docs/parameters.md", docs.str()});
   return pages;
 }

@@ -5,18 +5,13 @@
 #include <utility>
 #include <vector>
 
+#include "other_nodes.hpp"
 #include "urban_gnss_localization/localizers/registry.hpp"
 #include "urban_gnss_localization/parameters/assignment.hpp"
 #include "urban_gnss_localization/parameters/parameter_reader.hpp"
 #include "urban_gnss_localization/parameters/params_file.hpp"
-#include "urban_gnss_localization/ros/comparison_node_parameters.hpp"
-#include "urban_gnss_localization/ros/gps_bias_node_parameters.hpp"
-#include "urban_gnss_localization/ros/gpsd_node_parameters.hpp"
-#include "urban_gnss_localization/ros/occlusion_node.hpp"
-#include "urban_gnss_localization/ros/receiver_node_parameters.hpp"
 #include "urban_gnss_localization/ros/registered_localizer_node.hpp"
 #include "urban_gnss_localization/ros/state_keeper.hpp"
-#include "urban_gnss_localization/ros/waypoint_controller_node_parameters.hpp"
 
 /// A file of `params:=` as the nodes would read it, without a node.
 namespace urban_gnss {
@@ -28,6 +23,9 @@ struct ParamsCheck {
   std::string hint;                   ///< where nothing of the file is read
 };
 
+/// "imm_ekf" of "robot1/imm_ekf".
+inline std::string last_part(const std::string& path) { return path.substr(path.rfind('/') + 1); }
+
 /// The sections of a node: in the file itself, in a namespace, or under a name with slashes.
 inline std::vector<std::pair<std::string, YAML::Node>> find_sections(const YAML::Node& map, const std::string& node,
                                                                      const std::string& path = "") {
@@ -35,10 +33,9 @@ inline std::vector<std::pair<std::string, YAML::Node>> find_sections(const YAML:
   if (!map.IsMap()) return found;
   for (const auto& entry : map) {
     const std::string name = entry.first.as<std::string>("");
-    const std::string last = name.substr(name.rfind('/') + 1);
-    if (last == node) {
+    if (last_part(name) == node) {
       found.emplace_back(path + name, entry.second);
-    } else if (last != "expert") {  // its groups are called as some nodes are
+    } else if (name != "expert") {  // its groups are called as some nodes are
       const auto below = find_sections(entry.second, node, path + name + "/");
       found.insert(found.end(), below.begin(), below.end());
     }
@@ -46,13 +43,13 @@ inline std::vector<std::pair<std::string, YAML::Node>> find_sections(const YAML:
   return found;
 }
 
-/// Reads the sections of one node into its struct.
-template <class P>
-void check_sections(const std::string& file, const YAML::Node& content, const std::string& node, const P& defaults,
+/// Reads each section of a node into what `make` gives: its struct with the defaults.
+template <class Make>
+void check_sections(const std::string& file, const YAML::Node& content, const std::string& node, const Make& make,
                     ParamsCheck& check) {
   for (const auto& [path, section] : find_sections(content, node)) {
     check.sections.push_back(path);
-    P parameters = defaults;
+    auto parameters = make();
     ParameterReader reader(section, file, path + ".", Layout::kTiered);
     for (const char* other : {"diagnostic_period", "params_file", kStateFile}) reader.ignore(other);
     const std::vector<std::string> faults = reader.read(parameters).finish();
@@ -65,18 +62,15 @@ inline ParamsCheck check_params(const std::string& file, const LocalizerRegistry
   ParamsCheck check;
   const YAML::Node content = load_map(file);
   for (const LocalizerEntry& entry : localizers.entries()) {
-    check_sections(file, content, entry.name, LocalizerNodeSettings(entry), check);
+    check_sections(file, content, entry.name, [&entry = entry] { return LocalizerNodeSettings(entry); }, check);
   }
   // A name outside of a section is meant for a localizer: the first that the file has, or the default.
-  std::vector<std::string> nodes = {check.sections.empty() ? kDefaultLocalizer : check.sections.front()};
-  check_sections(file, content, "gps_bias", GpsBiasNodeParameters(), check);
-  check_sections(file, content, "occlusion", OcclusionNodeSettings(), check);
-  check_sections(file, content, "waypoint_controller", WaypointControllerNodeParameters(), check);
-  check_sections(file, content, "comparison", ComparisonNodeParameters(), check);
-  check_sections(file, content, "receiver", ReceiverNodeParameters(), check);
-  check_sections(file, content, "gpsd", GpsdNodeParameters(), check);
-  for (const char* node : {"gps_bias", "occlusion"}) nodes.push_back(node);
-  for (const std::string& path : check.sections) nodes.push_back(path.substr(path.rfind('/') + 1));
+  std::vector<std::string> nodes = {check.sections.empty() ? kDefaultLocalizer : last_part(check.sections.front()),
+                                    "gps_bias", "occlusion"};
+  for_each_other_node([&](const std::string& name, const std::string&, const auto& parameters) {
+    check_sections(file, content, name, [&defaults = parameters] { return defaults; }, check);
+  });
+  for (const std::string& path : check.sections) nodes.push_back(last_part(path));
   const ParamsFile found = read_params_file(file, nodes);
   check.faults.insert(check.faults.begin(), found.faults.begin(), found.faults.end());
   if (check.sections.empty()) check.hint = found.hint;

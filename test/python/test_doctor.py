@@ -330,6 +330,9 @@ class ModuleTest(unittest.TestCase):
         told = setup.setup_of({"imm_ekf": {"base_link_frame": "/base", "antenna_offset": [0.3, 0]}})
         self.assertEqual(("base", (0.3, 0.0), True), (told.base_link_frame, told.antenna_offset, told.given_antenna))
         self.assertEqual("ukf", setup.setup_of({"occlusion": {}, "ukf": {"odom_frame": "o"}}).section)
+        for other in ({"robot1": {"ukf": {"odom_frame": "o"}}}, {"/robot1/ukf": {"odom_frame": "o"}}):
+            self.assertEqual("o", setup.setup_of(other).odom_frame)
+        self.assertEqual(setup.DEFAULTS, setup.setup_of({"gps_bias": {}, "rate": {"a": 1}}))
         findings = examine(drive(seconds=20.0), told)
         self.assertIn("WARN frames.base_link_frame", said(findings))
 
