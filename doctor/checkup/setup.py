@@ -13,7 +13,7 @@ def sections(content):
     for path, values in content.items():
         name = str(path).split("/")[-1]
         if name in LOCALIZERS:
-            yield name, values
+            yield name, values or {}
         elif isinstance(values, dict) and name != "expert":
             yield from sections(values)
 
@@ -24,7 +24,7 @@ def setup_of(content):
     changes = {"section": section or DEFAULTS.section}
     for name in ("map_frame", "odom_frame", "base_link_frame"):
         if name in values:
-            changes[name] = values[name].lstrip("/")
+            changes[name] = str(values[name]).lstrip("/")
     if "antenna_offset" in values:
         x, y = (float(value) for value in values["antenna_offset"])
         changes.update(antenna_offset=(x, y), given_antenna=(x, y) != (0.0, 0.0))

@@ -88,6 +88,11 @@ class ProgramTest(unittest.TestCase):
         done = self.run_doctor("drive.bag", "--params", "p.yaml")
         self.assertEqual(0, done.returncode, done.stdout + done.stderr)
         self.assertIn("has no section imm_ekf, but my_driver", done.stderr)
+        for text in ("", "robot1: {imm_ekf: }", "imm_ekf: {map_frame: 1}"):
+            with open(os.path.join(self.folder.name, "p.yaml"), "w", encoding="utf-8") as stream_of:
+                stream_of.write(text)
+            done = self.run_doctor("drive.bag", "--params", "p.yaml")
+            self.assertEqual(0, done.returncode, done.stdout + done.stderr)
 
     def test_a_bag_without_fixes_says_so_in_its_last_line(self):
         for parts, words in ((("odometry", "imu"), "; no fixes in it"), (("fix", "velocity"), "; no odometry in it"),
