@@ -51,7 +51,7 @@ void merge_params(const std::string& file, Maps& maps, std::vector<std::string>&
   if (found.faults.empty()) merge_sections(found.sections, maps);
 }
 
-/// What is known of a kind of robot. Throws std::runtime_error that lists the kinds where there is none of this name.
+/// What is known of a kind of robot. Throws ParameterError that lists the kinds where there is none of this name.
 std::string robot_file(const std::string& robot) {
   namespace fs = std::filesystem;
   const fs::path folder = package_path() / "config" / "robots";
@@ -59,7 +59,7 @@ std::string robot_file(const std::string& robot) {
   if (fs::is_regular_file(file)) return file;
   std::string known;
   for (const std::string& name : yaml_files(folder)) known += " " + name;
-  throw std::runtime_error("--robot " + robot + ": must be one of" + known);
+  throw ParameterError("--robot", {robot + ": must be one of" + known});
 }
 
 void assign_option(const std::string& text, Maps& maps) {
