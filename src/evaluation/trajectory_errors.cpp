@@ -7,13 +7,12 @@
 #include <iterator>
 
 #include "urban_gnss_localization/geometry/angles.hpp"
+#include "urban_gnss_localization/geometry/ellipse.hpp"
 #include "urban_gnss_localization/geometry/protection_level.hpp"
 
 namespace urban_gnss {
 namespace {
 
-/// Quantile, 95 %, of the chi-squared distribution of 2 degrees of freedom.
-constexpr double kWithin95 = 5.991464547107979;
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 template <int N>
@@ -92,7 +91,7 @@ double position_sigma_m(const Eigen::Matrix3d& covariance) {
   return variance >= 0.0 ? std::sqrt(variance) : kNan;
 }
 
-bool is_inside_95(const ErrorSample& sample) { return sample.position_nees <= kWithin95; }
+bool is_inside_95(const ErrorSample& sample) { return sample.position_nees <= kEllipse95; }
 
 TrajectoryErrors errors_at_truth(const Trajectory& truth, const Trajectory& estimate, Stamp max_gap) {
   TrajectoryErrors errors;

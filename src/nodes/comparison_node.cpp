@@ -1,4 +1,5 @@
-// Errors of several localizers against the truth: ground_truth/odom and NAME/odometry/filtered in, error_plot out.
+// Errors of several localizers against the truth: ground_truth/odom and NAME/odometry/filtered in, error_plot and their
+// ellipses out.
 // Parameters: ComparisonNodeParameters (docs/parameters.md).
 
 #include <nav_msgs/Odometry.h>
@@ -12,6 +13,7 @@
 #include "urban_gnss_localization/ros/comparison_node_parameters.hpp"
 #include "urban_gnss_localization/ros/conversions.hpp"
 #include "urban_gnss_localization/ros/error_plot.hpp"
+#include "urban_gnss_localization/ros/markers.hpp"
 #include "urban_gnss_localization/ros/node_parameters.hpp"
 #include "urban_gnss_localization/ros/node_shell.hpp"
 #include "urban_gnss_localization/ros/topics.hpp"
@@ -40,12 +42,13 @@ class ComparisonNode {
         names_(words(parameters_.localizers)),
         history_(names_.size(), from_seconds(parameters_.window), kInterval) {
     publisher_ = node.advertise<sensor_msgs::Image>(topics::kErrorPlot, 2);
+    ellipse_publisher_ = node.advertise<visualization_msgs::Marker>(topics::kEllipses, 100);
     subscribers_.push_back(io_.subscribe<nav_msgs::Odometry>(
         node, topics::kTruth, 1000, [this](const auto& message) { history_.add_truth(to_timed_pose(*message)); }));
     for (std::size_t i = 0; i < names_.size(); ++i) {
       subscribers_.push_back(io_.subscribe<nav_msgs::Odometry>(
           node, names_[i] + "/" + topics::kEstimate, 1000,
-          [this, i](const auto& message) { history_.add_estimate(i, to_timed_pose(*message)); }));
+          [this, i](const auto& message) { take_estimate(i, *message); }));
     }
     five_second_timer_ = io_.every(node, 5.0, "the node's timer", [this] {
       if (!history_.has_truth()) {
@@ -57,9 +60,18 @@ class ComparisonNode {
   }
 
  private:
+  static Colour colour_of(std::size_t localizer) { return kPalette[localizer % std::size(kPalette)]; }
   static TimedPose to_timed_pose(const nav_msgs::Odometry& message) {
     const PoseEstimate estimate = to_pose_estimate(message.pose);
     return {to_stamp(message.header.stamp), estimate.pose, estimate.covariance};
+  }
+
+  void take_estimate(std::size_t localizer, const nav_msgs::Odometry& message) {
+    history_.add_estimate(localizer, to_timed_pose(message));
+    if (ellipse_publisher_.getNumSubscribers() == 0) return;
+    io_.publish(ellipse_publisher_,
+                ellipse_marker(to_pose_estimate(message.pose), colour_of(localizer), static_cast<int>(localizer),
+                               message.header.stamp, message.header.frame_id));
   }
 
   void publish() {
@@ -67,7 +79,7 @@ class ComparisonNode {
     std::vector<ErrorCurve> curves;
     for (std::size_t i = 0; i < names_.size(); ++i) {
       TrajectoryErrors errors = history_.errors(i);
-      if (!errors.samples.empty()) curves.push_back({names_[i], kPalette[i % std::size(kPalette)], std::move(errors)});
+      if (!errors.samples.empty()) curves.push_back({names_[i], colour_of(i), std::move(errors)});
     }
     sensor_msgs::Image image = error_plot(curves, *history_.latest(), from_seconds(parameters_.window),
                                           parameters_.plot_width, parameters_.plot_height);
@@ -81,6 +93,7 @@ class ComparisonNode {
   NodeShell io_{log_};
   ErrorHistory history_;
   ros::Publisher publisher_;
+  ros::Publisher ellipse_publisher_;
   std::vector<ros::Subscriber> subscribers_;
   ros::WallTimer timer_;
   ros::WallTimer five_second_timer_;

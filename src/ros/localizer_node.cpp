@@ -13,6 +13,8 @@ namespace urban_gnss {
 namespace {
 
 const ros::TransportHints kNoDelay = ros::TransportHints().tcpNoDelay();
+/// As the estimate's arrow in the views of rviz/.
+constexpr Colour kEstimateColour{0.16F, 0.51F, 1.0F, 1.0F};
 
 }  // namespace
 
@@ -31,6 +33,7 @@ LocalizerNode::LocalizerNode(ros::NodeHandle& node, ros::NodeHandle& private_nod
   estimate_publisher_ = node.advertise<nav_msgs::Odometry>(topics::kEstimate, 100);
   fix_publisher_ = node.advertise<sensor_msgs::NavSatFix>(topics::kFilteredFix, 100);
   status_publisher_ = private_node.advertise<urban_gnss_localization::LocalizationStatus>(topics::kStatus, 100);
+  ellipse_publisher_ = node.advertise<visualization_msgs::Marker>(topics::kEllipse, 1);
   status_text_publisher_ = node.advertise<visualization_msgs::Marker>(topics::kStatusText, 1, true);
   datum_publisher_ = node.advertise<sensor_msgs::NavSatFix>(topics::kDatum, 1, true);
 
@@ -225,6 +228,10 @@ void LocalizerNode::publish_output(const LocalizationOutput& output) {
   const auto& frames = parameters_.frames;
   if (!io_.publish(estimate_publisher_, to_message(output, frames))) return;
   ++outputs_;
+  if (ellipse_publisher_.getNumSubscribers() > 0) {
+    io_.publish(ellipse_publisher_,
+                ellipse_marker(output.estimate, kEstimateColour, 0, to_ros(output.stamp), frames.map));
+  }
   io_.publish(fix_publisher_, to_fix_message(output, *pipeline_.frame(), frames));
   const auto map_to_odom =
       to_map_to_odom(slew_.follow(output), output.stamp, frames, parameters_.transform_time_offset);

@@ -57,14 +57,6 @@ std::string first_of(std::initializer_list<std::string> faults) {
   return {};
 }
 
-std::string marker_fault(const visualization_msgs::Marker& marker) {
-  if (!is_finite(marker.pose.position) || !is_finite(marker.scale)) return not_finite("pose or scale");
-  for (const geometry_msgs::Point& point : marker.points) {
-    if (!is_finite(point)) return not_finite("a point");
-  }
-  return {};
-}
-
 }  // namespace
 
 std::string message_fault(const geometry_msgs::PoseWithCovariance& pose) {
@@ -117,9 +109,17 @@ std::string message_fault(const sensor_msgs::PointCloud2& cloud) {
   return {};
 }
 
+std::string message_fault(const visualization_msgs::Marker& marker) {
+  if (!is_finite(marker.pose.position) || !is_finite(marker.scale)) return not_finite("pose or scale");
+  for (const geometry_msgs::Point& point : marker.points) {
+    if (!is_finite(point)) return not_finite("a point");
+  }
+  return {};
+}
+
 std::string message_fault(const visualization_msgs::MarkerArray& markers) {
   for (const visualization_msgs::Marker& marker : markers.markers) {
-    const std::string fault = marker_fault(marker);
+    const std::string fault = message_fault(marker);
     if (!fault.empty()) return marker.ns + ": " + fault;
   }
   return {};

@@ -10,6 +10,7 @@ import rostest
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Image
 from tf2_msgs.msg import TFMessage
+from visualization_msgs.msg import Marker
 
 NAMES = ("particle_filter", "switching_particle_filter", "imm_ekf", "complementary_ekf", "ukf")
 # As in rviz/comparison.rviz.
@@ -50,10 +51,17 @@ class ComparisonTest(unittest.TestCase):
             rospy.Subscriber(name + "/odometry/filtered", Odometry, on_pose, estimates[name], queue_size=5000)
         rospy.Subscriber("ground_truth/odom", Odometry, on_pose, truth, queue_size=5000)
         rospy.Subscriber("error_plot", Image, on_plot, queue_size=2)
+        ellipses = {}
+        rospy.Subscriber("ellipses", Marker, lambda message: ellipses.__setitem__(message.id, message.color),
+                         queue_size=1000)
         with news:
             self.assertTrue(news.wait_for(is_plotted, WAIT_S), {name: len(each) for name, each in estimates.items()})
             stamps, plot = common(), plots[-1]
 
+        self.assertEqual(sorted(ellipses), list(range(len(NAMES))))
+        for i, colour in enumerate(COLOURS):
+            for part, value in zip((ellipses[i].r, ellipses[i].g, ellipses[i].b), colour):
+                self.assertAlmostEqual(255.0 * part, value, delta=1.0)
         for name in NAMES:
             errors = [math.hypot(estimates[name][t].x - truth[t].x, estimates[name][t].y - truth[t].y) for t in stamps]
             rospy.loginfo("%s: at most %.1f m off", name, max(errors))

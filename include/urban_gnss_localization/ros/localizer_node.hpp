@@ -116,6 +116,7 @@ class LocalizerNode {
   ros::Publisher estimate_publisher_;
   ros::Publisher fix_publisher_;  ///< the estimate as a fix
   ros::Publisher status_publisher_;
+  ros::Publisher ellipse_publisher_;      ///< for rviz
   ros::Publisher status_text_publisher_;  ///< for rviz
   ros::Publisher datum_publisher_;
   std::vector<ros::Subscriber> subscribers_;

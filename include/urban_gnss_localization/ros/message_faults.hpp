@@ -31,6 +31,7 @@ std::string message_fault(const sensor_msgs::NavSatFix& fix);
 std::string message_fault(const geometry_msgs::PoseArray& poses);
 /// Of fields that are FLOAT32 all.
 std::string message_fault(const sensor_msgs::PointCloud2& cloud);
+std::string message_fault(const visualization_msgs::Marker& marker);
 std::string message_fault(const visualization_msgs::MarkerArray& markers);
 std::string message_fault(const urban_gnss_localization::GpsBias& bias);
 std::string message_fault(const urban_gnss_localization::Visibility& visibility);
