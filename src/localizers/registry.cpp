@@ -38,7 +38,9 @@ std::string LocalizerRegistry::names() const {
 const LocalizerEntry& LocalizerRegistry::find(const std::string& name) const {
   const auto found =
       std::find_if(entries_.begin(), entries_.end(), [&](const auto& each) { return each.name == name; });
-  if (found == entries_.end()) throw std::runtime_error(name + ": no such localizer; " + guess(name) + "there are " + names());
+  if (found == entries_.end()) {
+    throw std::runtime_error(name + ": no such localizer; " + guess(name) + "there are " + names());
+  }
   return *found;
 }
 

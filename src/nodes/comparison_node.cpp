@@ -46,9 +46,9 @@ class ComparisonNode {
     subscribers_.push_back(io_.subscribe<nav_msgs::Odometry>(
         node, topics::kTruth, 1000, [this](const auto& message) { history_.add_truth(to_timed_pose(*message)); }));
     for (std::size_t i = 0; i < names_.size(); ++i) {
-      subscribers_.push_back(io_.subscribe<nav_msgs::Odometry>(
-          node, names_[i] + "/" + topics::kEstimate, 1000,
-          [this, i](const auto& message) { take_estimate(i, *message); }));
+      subscribers_.push_back(
+          io_.subscribe<nav_msgs::Odometry>(node, names_[i] + "/" + topics::kEstimate, 1000,
+                                            [this, i](const auto& message) { take_estimate(i, *message); }));
     }
     five_second_timer_ = io_.every(node, 5.0, "the node's timer", [this] {
       if (!history_.has_truth()) {

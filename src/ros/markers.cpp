@@ -53,12 +53,13 @@ visualization_msgs::Marker ellipse_marker(const PoseEstimate& estimate, Colour c
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(estimate.covariance.topLeftCorner<2, 2>());
   const Eigen::Vector2d radii = (kEllipse95 * axes.eigenvalues().cwiseMax(0.0)).cwiseSqrt();
   Marker ellipse = make_marker("ellipse", id, Marker::LINE_STRIP, colour, time, map_frame);
-  ellipse.lifetime = ros::Duration(3.0);  // it goes when the estimates end
+  ellipse.lifetime = ros::Duration(3.0);                             // it goes when the estimates end
   ellipse.scale.x = std::clamp(0.04 * radii.maxCoeff(), 0.05, 0.6);  // seen from afar, if it is large
   for (int i = 0; i <= kSegments; ++i) {
     const double angle = 2.0 * kPi * i / kSegments;
-    const Eigen::Vector2d place = estimate.pose.position() + axes.eigenvectors() * radii.cwiseProduct(Eigen::Vector2d(
-                                                                 std::cos(angle), std::sin(angle)));
+    const Eigen::Vector2d place =
+        estimate.pose.position() +
+        axes.eigenvectors() * radii.cwiseProduct(Eigen::Vector2d(std::cos(angle), std::sin(angle)));
     ellipse.points.push_back(point(place.x(), place.y(), kHeight_m));
   }
   return ellipse;

@@ -64,9 +64,8 @@ inline std::string describe(const std::vector<Gap>& gaps, Stamp start) {
   const auto longest = std::max_element(gaps.begin(), gaps.end(),
                                         [](const auto& a, const auto& b) { return a.end - a.begin < b.end - b.begin; });
   std::ostringstream text;
-  text << std::fixed << std::setprecision(1) << gaps.size() << " (longest "
-       << to_seconds(longest->end - longest->begin) << " s, from "
-       << to_seconds(longest->begin - start) << " s)";
+  text << std::fixed << std::setprecision(1) << gaps.size() << " (longest " << to_seconds(longest->end - longest->begin)
+       << " s, from " << to_seconds(longest->begin - start) << " s)";
   return text.str();
 }
 

@@ -15,8 +15,7 @@ void for_each_other_node(Use use) {
   use("gps_bias",
       "The bias filter of Nishida et al. What it shares with the localizer has the same name and place there.",
       GpsBiasNodeParameters());
-  use("occlusion", "Covariances of fixes by ray traces to the satellites, Maier and Kleiner.",
-      OcclusionNodeSettings());
+  use("occlusion", "Covariances of fixes by ray traces to the satellites, Maier and Kleiner.", OcclusionNodeSettings());
   use("waypoint_controller", "The steering law of Nishida et al., eq. (36) to (38).",
       WaypointControllerNodeParameters());
   use("comparison", "Plots the errors of several localizers, where there is a ground truth (comparison.launch).",

@@ -26,17 +26,19 @@ struct ParamsCheck {
 /// "imm_ekf" of "robot1/imm_ekf".
 inline std::string last_part(const std::string& path) { return path.substr(path.rfind('/') + 1); }
 
-/// The sections of a node: in the file itself, in a namespace, or under a name with slashes.
+/// The sections of a node: in the file itself, under a name with slashes, or, as maps, in a namespace. What looks like
+/// a namespace may be another program's section, with names of its own: that of a node is taken for one only if no
+/// other program would have it, a localizer's.
 inline std::vector<std::pair<std::string, YAML::Node>> find_sections(const YAML::Node& map, const std::string& node,
-                                                                     const std::string& path = "") {
+                                                                     bool is_own_name, const std::string& path = "") {
   std::vector<std::pair<std::string, YAML::Node>> found;
   if (!map.IsMap()) return found;
   for (const auto& entry : map) {
     const std::string name = entry.first.as<std::string>("");
-    if (last_part(name) == node) {
+    if (last_part(name) == node && (path.empty() || entry.second.IsMap())) {
       found.emplace_back(path + name, entry.second);
-    } else if (name != "expert") {  // its groups are called as some nodes are
-      const auto below = find_sections(entry.second, node, path + name + "/");
+    } else if (is_own_name && name != "expert") {
+      const auto below = find_sections(entry.second, node, is_own_name, path + name + "/");
       found.insert(found.end(), below.begin(), below.end());
     }
   }
@@ -45,9 +47,9 @@ inline std::vector<std::pair<std::string, YAML::Node>> find_sections(const YAML:
 
 /// Reads each section of a node into what `make` gives: its struct with the defaults.
 template <class Make>
-void check_sections(const std::string& file, const YAML::Node& content, const std::string& node, const Make& make,
-                    ParamsCheck& check) {
-  for (const auto& [path, section] : find_sections(content, node)) {
+void check_sections(const std::string& file, const YAML::Node& content, const std::string& node, bool is_own_name,
+                    const Make& make, ParamsCheck& check) {
+  for (const auto& [path, section] : find_sections(content, node, is_own_name)) {
     check.sections.push_back(path);
     auto parameters = make();
     ParameterReader reader(section, file, path + ".", Layout::kTiered);
@@ -62,13 +64,15 @@ inline ParamsCheck check_params(const std::string& file, const LocalizerRegistry
   ParamsCheck check;
   const YAML::Node content = load_map(file);
   for (const LocalizerEntry& entry : localizers.entries()) {
-    check_sections(file, content, entry.name, [&entry = entry] { return LocalizerNodeSettings(entry); }, check);
+    check_sections(
+        file, content, entry.name, true, [&entry = entry] { return LocalizerNodeSettings(entry); }, check);
   }
   // A name outside of a section is meant for a localizer: the first that the file has, or the default.
   std::vector<std::string> nodes = {check.sections.empty() ? kDefaultLocalizer : last_part(check.sections.front()),
                                     "gps_bias", "occlusion"};
   for_each_other_node([&](const std::string& name, const std::string&, const auto& parameters) {
-    check_sections(file, content, name, [&defaults = parameters] { return defaults; }, check);
+    check_sections(
+        file, content, name, false, [&defaults = parameters] { return defaults; }, check);
   });
   for (const std::string& path : check.sections) nodes.push_back(last_part(path));
   const ParamsFile found = read_params_file(file, nodes);

@@ -88,7 +88,7 @@ class ProgramTest(unittest.TestCase):
         done = self.run_doctor("drive.bag", "--params", "p.yaml")
         self.assertEqual(0, done.returncode, done.stdout + done.stderr)
         self.assertIn("has no section imm_ekf, but my_driver", done.stderr)
-        for text in ("", "robot1: {imm_ekf: }", "imm_ekf: {map_frame: 1}"):
+        for text in ("", "robot1: {imm_ekf: }", "imm_ekf: {map_frame: 1}", "my_driver: {receiver: {port: 3}}"):
             with open(os.path.join(self.folder.name, "p.yaml"), "w", encoding="utf-8") as stream_of:
                 stream_of.write(text)
             done = self.run_doctor("drive.bag", "--params", "p.yaml")
