@@ -82,10 +82,13 @@ class PcdCheck {
     std::string line;
     while (entries_.count("DATA") == 0) {
       if (!read_line(line)) fail("its header has no entry DATA");
+      if (line.empty()) continue;
       std::istringstream words(line);
       std::string name;
       words >> name;
-      if (name.empty() || name.front() == '#') continue;
+      // PCL takes it for the end of the header, and then looks at points for which it has no memory.
+      if (name.empty()) fail("a line of its header is of spaces");
+      if (name.front() == '#') continue;
       if (entry_names().count(name) == 0) fail("its header has an unknown entry");
       if (name == "COLUMNS") name = "FIELDS";
       std::vector<std::string> values{std::istream_iterator<std::string>(words), {}};

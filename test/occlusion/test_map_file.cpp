@@ -58,6 +58,22 @@ TEST_F(MapFile, PointsThatLookLikeAHeaderAreRefused) {
   }
 }
 
+// PCL ends its header there, and looked at a point for which it had no memory.
+TEST_F(MapFile, ALineOfSpacesInTheHeaderIsRefused) {
+  const std::string header = "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 1\nHEIGHT 1\n";
+  for (const char* line : {" \n", "\t\n", "\r\n", " \v \n"}) {
+    std::ofstream(in("a.pcd")) << header << line << "POINTS 1\nDATA ascii\n1 2 3\n";
+    try {
+      read_pcd(in("a.pcd"));
+      ADD_FAILURE() << line;
+    } catch (const std::runtime_error& error) {
+      EXPECT_THAT(error.what(), HasSubstr("a.pcd: is no .pcd file that can be read: a line of its header is of spaces"));
+    }
+  }
+  std::ofstream(in("a.pcd")) << "\n" << header << "\n\nPOINTS 1\nDATA ascii\n1 2 3\n";
+  EXPECT_EQ(read_pcd(in("a.pcd")).size(), 1u) << "empty lines are none of spaces";
+}
+
 TEST_F(MapFile, OtherPathsAreRefused) {
   EXPECT_THAT(map_file_fault("map.pcd", false), HasSubstr("absolute"));
   EXPECT_THAT(map_file_fault("../map.pcd", false), HasSubstr("absolute"));
