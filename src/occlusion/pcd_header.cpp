@@ -17,6 +17,7 @@
 namespace urban_gnss {
 namespace {
 
+constexpr char kOldFields[] = "COLUMNS";  // of FIELDS, in old files
 constexpr std::size_t kLongestLine = 1 << 16;
 constexpr std::uint64_t kLargestPoint = 1 << 16;  // bytes
 constexpr std::uint64_t kMostPoints = 1ULL << 31;
@@ -56,10 +57,16 @@ class PcdCheck {
     throw std::runtime_error(path_ + ": is no .pcd file that can be read: " + what);
   }
 
-  static const std::set<std::string>& entry_names() {
-    static const std::set<std::string> names{"VERSION", "FIELDS", "COLUMNS",   "SIZE",   "TYPE", "COUNT",
-                                             "WIDTH",   "HEIGHT", "VIEWPOINT", "POINTS", "DATA"};
+  /// In the order that the format prescribes. PCL takes others: it makes memory for the points when it comes to POINTS,
+  /// of the size that they have by the entries until then.
+  static const std::vector<std::string>& entry_names() {
+    static const std::vector<std::string> names{"VERSION", "FIELDS", "SIZE",      "TYPE",   "COUNT",
+                                                "WIDTH",   "HEIGHT", "VIEWPOINT", "POINTS", "DATA"};
     return names;
+  }
+  /// Whether PCL takes a word for this entry.
+  static bool begins_with(const std::string& word, const std::string& entry) {
+    return word.compare(0, entry.size(), entry) == 0;
   }
 
   /// PCL reads on after DATA, until a line that is neither empty, a comment nor an entry: points that look like entries
@@ -71,8 +78,9 @@ class PcdCheck {
       std::string name;
       words >> name;
       for (const std::string& entry : entry_names()) {
-        if (name.compare(0, entry.size(), entry) == 0) fail("its points look like an entry " + entry);
+        if (begins_with(name, entry)) fail("its points look like an entry " + entry);
       }
+      if (begins_with(name, kOldFields)) fail(std::string("its points look like an entry ") + kOldFields);
       if (!name.empty() && name.front() != '#') return;
       line.clear();
     }
@@ -80,6 +88,7 @@ class PcdCheck {
 
   void read_entries() {
     std::string line;
+    auto last = entry_names().begin();
     while (entries_.count("DATA") == 0) {
       if (!read_line(line)) fail("its header has no entry DATA");
       if (line.empty()) continue;
@@ -89,10 +98,14 @@ class PcdCheck {
       // PCL takes it for the end of the header, and then looks at points for which it has no memory.
       if (name.empty()) fail("a line of its header is of spaces");
       if (name.front() == '#') continue;
-      if (entry_names().count(name) == 0) fail("its header has an unknown entry");
-      if (name == "COLUMNS") name = "FIELDS";
+      if (line.find_first_of("\v\f") != std::string::npos) fail("a line of its header has other spaces than PCL takes");
+      if (name == kOldFields) name = "FIELDS";
+      const auto entry = std::find(entry_names().begin(), entry_names().end(), name);
+      if (entry == entry_names().end()) fail("its header has an unknown entry");
       std::vector<std::string> values{std::istream_iterator<std::string>(words), {}};
       if (!entries_.emplace(name, values).second) fail(name + " stands twice in its header");
+      if (entry < last) fail(name + " stands behind " + *last + " in its header");
+      last = entry;
       if (values.empty()) fail(name + " is empty");
     }
   }

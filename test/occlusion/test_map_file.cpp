@@ -67,11 +67,33 @@ TEST_F(MapFile, ALineOfSpacesInTheHeaderIsRefused) {
       read_pcd(in("a.pcd"));
       ADD_FAILURE() << line;
     } catch (const std::runtime_error& error) {
-      EXPECT_THAT(error.what(), HasSubstr("a.pcd: is no .pcd file that can be read: a line of its header is of spaces"));
+      EXPECT_THAT(error.what(),
+                  HasSubstr("a.pcd: is no .pcd file that can be read: a line of its header is of spaces"));
     }
   }
   std::ofstream(in("a.pcd")) << "\n" << header << "\n\nPOINTS 1\nDATA ascii\n1 2 3\n";
   EXPECT_EQ(read_pcd(in("a.pcd")).size(), 1u) << "empty lines are none of spaces";
+}
+
+// PCL made memory for points of the size by the entries that it had seen, and wrote beyond it.
+TEST_F(MapFile, AHeaderInAnotherOrderIsRefused) {
+  const std::string points = "DATA ascii\n1 2 3 4\n1 2 3 4\n";
+  const auto fault_of = [&](const std::string& header) -> std::string {
+    std::ofstream(in("a.pcd")) << header << points;
+    try {
+      read_pcd(in("a.pcd"));
+    } catch (const std::runtime_error& error) {
+      return error.what();
+    }
+    return "";
+  };
+  const std::string fields = "FIELDS x y z a\n", size = "SIZE 4 4 4 8\n", type = "TYPE F F F F\n";
+  EXPECT_EQ(fault_of(fields + size + type + "COUNT 1 1 1 1\nWIDTH 2\nHEIGHT 1\nPOINTS 2\n"), "");
+  EXPECT_EQ(fault_of("# old\nCOLUMNS x y z a\n" + size + type + "POINTS 2\n"), "");
+  EXPECT_THAT(fault_of(fields + "POINTS 2\n" + size + type), HasSubstr("SIZE stands behind POINTS in its header"));
+  EXPECT_THAT(fault_of(fields + size + type + "POINTS 2\nCOUNT 1 1 1 1\n"), HasSubstr("COUNT stands behind POINTS"));
+  EXPECT_THAT(fault_of(size + fields + type + "POINTS 2\n"), HasSubstr("FIELDS stands behind SIZE"));
+  EXPECT_THAT(fault_of("FIELDS x\vy z a\n" + size + type + "POINTS 2\n"), HasSubstr("other spaces than PCL takes"));
 }
 
 TEST_F(MapFile, OtherPathsAreRefused) {
