@@ -545,6 +545,18 @@ function addControls(parent, view, map) {
   }
   element(box, "button", "whole drive").addEventListener("click", () => map.fit());
   const legend = element(parent, "p", "", { className: "controls" });
+  const states = element(parent, "p", "", { className: "controls" });
+  const addStates = () => {
+    const { t, state, healthy, reason } = view.chosen.states;
+    states.textContent = t.length ? "States: " : "";
+    [...new Set(state)].forEach(name => {
+      const label = element(states, "span", "", { className: "entry" });
+      element(label, "span", "", { className: "swatch" }).style.background = STATES[name] || WAITING;
+      label.appendChild(document.createTextNode(name));
+    });
+    const why = new Set(reason.filter((text, i) => text && !healthy[i]).map(text => text.replace(/; the last.*/, "")));
+    if (why.size) states.appendChild(document.createTextNode("Not healthy: " + [...why].join("; ")));
+  };
   const addLegend = () => {
     legend.textContent = "Fixes: ";
     const counts = {};
@@ -557,6 +569,7 @@ function addControls(parent, view, map) {
     if (!Object.keys(counts).length) legend.textContent = "No fixes.";
     const missing = view.chosen.fixes_without_position;
     if (missing) element(legend, "span", `${missing} without a position are not drawn`, { className: "entry" });
+    addStates();
   };
   addLegend();
 }

@@ -11,6 +11,7 @@ FAIL_AHEAD_S = 0.9
 DRIFT_S = 0.3          # a delay that grows by more is no latency
 LATE_S = 0.5           # later than this after its stamp is more than a receiver needs
 ANOTHER_EPOCH_S = 86400.0
+AUTO_DELAY_S = 2.5     # by these fits, which are off by some tenths, up to here auto is better than a number
 FAR_S = 3.0            # the most that a localizer allows for by itself is 2 s
 NAMED_OFFSETS = ((18.0, "GPS time instead of UTC: 18 leap seconds"), (37.0, "TAI instead of UTC: 37 leap seconds"),
                  (19.0, "TAI instead of GPS time"))
@@ -167,8 +168,8 @@ def receiver_lag(evidence, kind, track, source=None):
         text += ": fixes come late and have the time of their arrival"  if kind == "fix" else ": it comes late"
     change = ["the driver's stamps: the time of the measurement, in UTC"]
     if abs(lag) <= FAR_S:
-        change.append("imm_ekf: {{expert: {{fix_delay: {:.1f}}}}}  # or leave it at auto, which finds up to 2 s".format(
-            lag))
+        change.append("or nothing: fix_delay is found by itself (auto), up to 2 s" if 0.0 < lag < AUTO_DELAY_S else
+                      "imm_ekf: {{expert: {{fix_delay: {:.1f}}}}}  # auto finds up to 2 s".format(lag))
         return [warned(name, text, *change, **values)]
     evidence.shift(kind, lag)  # so that the other checks see past it
     finding = failed if helps >= HELPS_FAIL else warned

@@ -56,7 +56,7 @@ def plot_tracks(axes, evidence):
                 laid = np.exp(1j * fitted.rotation) * p
                 laid = laid + signals.median((q[inside] - laid).real) + 1j * signals.median((q[inside] - laid).imag)
                 axes.plot(*thin(laid.real, laid.imag), color=COLOURS["odometry"], linewidth=3.0,
-                          label="odometry, laid over the fixes")
+                          label="odometry alone, laid over the fixes: it drifts")
         axes.plot(*thin(q.real, q.imag), ".", color=COLOURS["fix"], markersize=2.5, label="fixes")
         low, high = np.percentile(q.real, [1, 99]), np.percentile(q.imag, [1, 99])
         margin = 0.2 * max(np.ptp(low), np.ptp(high), 5.0)

@@ -141,7 +141,7 @@ std::runtime_error PendingFile::failure(const std::string& otherwise) const {
 }
 
 void remove_pending_files_on_signals() {
-  for (const int signal : {SIGHUP, SIGINT, SIGTERM, SIGQUIT}) {
+  for (const int signal : {SIGHUP, SIGINT, SIGTERM, SIGQUIT, SIGPIPE}) {
     if (std::signal(signal, remove_and_end) == SIG_IGN) std::signal(signal, SIG_IGN);  // as nohup has it
   }
   std::signal(SIGXFSZ, SIG_IGN);

@@ -69,7 +69,7 @@ void summarize_states(const TrackReport& report, TrackSummary& summary) {
     const double seconds = std::max(0.0, to_seconds(end - state.stamp));
     summary.seconds_in_state[state.state] += seconds;
     all_s += seconds;
-    if (state.healthy) healthy_s += seconds;
+    (state.healthy ? healthy_s : summary.seconds_not_healthy[state.reason]) += seconds;
   }
   if (all_s > 0.0) summary.healthy_share = healthy_s / all_s;
 }
@@ -174,6 +174,7 @@ nlohmann::json to_json(const TrackSummary& summary) {
           {"nis", to_json(summary.nis)},
           {"nis_above_threshold", number_or_null(summary.nis_above_threshold)},
           {"seconds_in_state", summary.seconds_in_state},
+          {"seconds_not_healthy", summary.seconds_not_healthy},
           {"healthy_share", number_or_null(summary.healthy_share)}};
 }
 

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "files/bag_reader.hpp"
+#include "replay/text_counts.hpp"
 #include "urban_gnss_localization/evaluation/track_report.hpp"
 #include "urban_gnss_localization/pipeline/status_reporter.hpp"
 #include "urban_gnss_localization/ros/conversions.hpp"
@@ -103,7 +104,8 @@ inline std::string namespace_above(std::string topic, int levels) {
   return topic;
 }
 
-/// What a localizer said: its states where they change, and its decisions by the fixes' stamps.
+/// What a localizer said: its states where they change, and why it is not healthy, and its decisions by the fixes'
+/// stamps.
 struct StatusTrack {
   std::string localizer;
   std::vector<StatedState> states;
@@ -126,7 +128,10 @@ inline StatusTrack read_status(const BagReader& bag, const std::string& estimate
           StatedState state{to_stamp(status.header.stamp), to_string(static_cast<LocalizationState>(status.state)),
                             status.healthy != 0, status.reason};
           const StatedState* last = track.states.empty() ? nullptr : &track.states.back();
-          if (last && last->state == state.state && last->healthy == state.healthy) return;
+          const bool is_same = last && last->state == state.state && last->healthy == state.healthy;
+          if (is_same && (state.healthy || TextCounts::kind_of(last->reason) == TextCounts::kind_of(state.reason))) {
+            return;
+          }
           if (last && state.stamp < last->stamp) state.stamp = last->stamp;
           track.states.push_back(state);
         });

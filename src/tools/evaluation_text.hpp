@@ -92,6 +92,9 @@ inline void print_track(std::ostream& out, const TrackReport& report, const Trac
   for (const auto& [state, seconds] : summary.seconds_in_state) {
     out << "  " << state << ": " << std::setprecision(1) << seconds << " s\n";
   }
+  for (const auto& [reason, seconds] : summary.seconds_not_healthy) {
+    out << "  not healthy: " << seconds << " s: " << reason << '\n';
+  }
 }
 
 }  // namespace urban_gnss

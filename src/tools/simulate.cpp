@@ -33,7 +33,7 @@ using namespace urban_gnss;
 namespace {
 
 constexpr double kPaperFieldDuration_s = 30.0;  ///< three laps
-constexpr double kForecastAfter_s = 5.0;        ///< of simulated time, in which every sensor has spoken
+constexpr double kForecastAfter_s = 5.0;        ///< of a drive that is under way, in which every sensor has spoken
 
 struct Options {
   std::string scenario;
@@ -154,14 +154,23 @@ std::string bytes_text(double bytes) {
   return text.str();
 }
 
-/// How large the bag will be, from its size when `done` (0 to 1) of the drive is over.
-void print_forecast(const Options& options, std::uint64_t size, double done) {
-  const double bytes = static_cast<double>(size) / done;
+/// How much of the drive (0 to 1) is over, and how large the bag is.
+struct Written {
+  Stamp stamp{0};
+  double done{0.0};
+  std::uint64_t size{0};
+};
+
+/// How large the bag will be, if what is left of the drive goes on as it did between these two. It begins
+/// standing, and slowly.
+void print_forecast(const Options& options, const Written& from, const Written& to) {
+  const auto size = static_cast<double>(to.size);
+  const double bytes = size + (size - static_cast<double>(from.size)) * (1.0 - to.done) / (to.done - from.done);
   std::cerr << options.output << ": will have about " << bytes_text(bytes);
   std::error_code error;
   const fs::path folder = fs::absolute(options.output, error).parent_path();
   const auto space = fs::space(folder, error);
-  const double missing = bytes - static_cast<double>(size) - static_cast<double>(space.available);
+  const double missing = bytes - size - static_cast<double>(space.available);
   if (!error && missing > 0.0) std::cerr << ", for which the disk lacks " << bytes_text(missing);
   if (!options.without_lidar) std::cerr << "; --without-lidar leaves out the scans, most of it";
   std::cerr << '\n';
@@ -187,6 +196,8 @@ void run(const Options& options, const InputFiles& inputs) {
     const double wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - wall_start).count();
     return to_seconds(simulator.now() - begin) / std::max(wall_s, 1e-6);
   };
+  std::optional<Stamp> moving_since;
+  std::optional<Written> under_way;
   bool is_forecast_due = bag != nullptr;
   while (!simulator.is_finished()) {
     events.clear();
@@ -198,9 +209,14 @@ void run(const Options& options, const InputFiles& inputs) {
         bag->write(topic, event.published, message);
       });
     }
-    if (is_forecast_due && to_seconds(simulator.now() - begin) >= kForecastAfter_s && simulator.progress() > 0.0) {
-      print_forecast(options, bag->size(), simulator.progress());
-      is_forecast_due = false;
+    if (is_forecast_due && simulator.progress() > 0.0) {
+      const Written now{simulator.now(), simulator.progress(), bag->size()};
+      if (!moving_since) moving_since = now.stamp;
+      if (!under_way && to_seconds(now.stamp - *moving_since) >= kForecastAfter_s) under_way = now;
+      if (under_way && to_seconds(now.stamp - under_way->stamp) >= kForecastAfter_s && now.done > under_way->done) {
+        print_forecast(options, *under_way, now);
+        is_forecast_due = false;
+      }
     }
     std::ostringstream detail;
     detail << std::fixed << std::setprecision(0) << to_seconds(simulator.now() - begin) << " s simulated, "
@@ -214,7 +230,7 @@ void run(const Options& options, const InputFiles& inputs) {
   const ReceiverSummary summary = statistics.summary();
   std::cout << std::fixed << std::setprecision(1) << "scenario        " << run.name << ", seed " << run.seed << ", "
             << simulated_s << " s, " << real_time_factor() << " x real time\n";
-  if (!options.output.empty()) std::cout << "written         " << options.output << '\n';
+  std::cout << "written         " << (options.output.empty() ? "nothing (--output BAG)" : options.output) << '\n';
   print_summary(summary, std::cout);
   if (!options.json_file.empty()) {
     nlohmann::json json = to_json(summary);

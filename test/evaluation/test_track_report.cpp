@@ -51,7 +51,7 @@ TrackReport drive() {
     const bool far = t == 5;
     report.fixes.push_back(decided(t, far ? FixDecision::kRejectedGate : FixDecision::kAccepted, far ? 20.0 : 1.0));
   }
-  report.states = {{from_seconds(0.0), "initializing", false, ""}, {from_seconds(2.5), "tracking", true, ""}};
+  report.states = {{from_seconds(0.0), "initializing", false, "waiting"}, {from_seconds(2.5), "tracking", true, ""}};
   return report;
 }
 
@@ -72,6 +72,7 @@ TEST(TrackReport, CountsWhatWasDecided) {
   EXPECT_DOUBLE_EQ(summary.seconds_in_state.at("initializing"), 2.5);
   EXPECT_DOUBLE_EQ(summary.seconds_in_state.at("tracking"), 7.5);
   EXPECT_DOUBLE_EQ(summary.healthy_share, 0.75);
+  EXPECT_EQ(summary.seconds_not_healthy, (std::map<std::string, double>{{"waiting", 2.5}}));
 }
 
 TEST(TrackReport, FindsWhereFixesWereNotUsed) {

@@ -66,6 +66,7 @@ struct TrackSummary {
   Summary nis;                                                           ///< of all fixes that have one
   double nis_above_threshold{std::numeric_limits<double>::quiet_NaN()};  ///< share (0 to 1)
   std::map<std::string, double> seconds_in_state;                        ///< by name
+  std::map<std::string, double> seconds_not_healthy;                     ///< by the reason
   double healthy_share{std::numeric_limits<double>::quiet_NaN()};        ///< of the time since the first status, 0 to 1
 };
 

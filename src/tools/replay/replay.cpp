@@ -69,6 +69,9 @@ void print_summary(const ReplayRun& replay, const nlohmann::json& metrics, doubl
   for (const auto& [kind, texts] : replay.rejections().kinds()) {
     std::cout << "  " << texts.count << " times " << texts.first << '\n';
   }
+  const LocalizationReport report = replay.pipeline().report();
+  std::cout << "at the end: " << to_string(report.state) << (report.healthy ? ", healthy" : ", not healthy: ")
+            << (report.healthy ? "" : report.reason) << '\n';
   if (!metrics.contains("errors")) return;
   const auto& errors = metrics["errors"];
   const auto print = [](const nlohmann::json& value, double factor = 1.0) {

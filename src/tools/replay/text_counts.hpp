@@ -17,14 +17,14 @@ class TextCounts {
 
   /// How many there have been of its kind, with this one.
   std::size_t add(const std::string& text) {
-    Kind& kind = kinds_[without_numbers(text)];
+    Kind& kind = kinds_[kind_of(text)];
     if (kind.count == 0) kind.first = text;
     return ++kind.count;
   }
   const std::map<std::string, Kind>& kinds() const { return kinds_; }
 
- private:
-  static std::string without_numbers(const std::string& text) {
+  /// The text without its numbers.
+  static std::string kind_of(const std::string& text) {
     std::string kind;
     for (const char c : text) {
       const bool is_of_number = std::isdigit(static_cast<unsigned char>(c)) != 0 || c == '.' || c == '-' || c == '+';
@@ -33,6 +33,7 @@ class TextCounts {
     return kind;
   }
 
+ private:
   std::map<std::string, Kind> kinds_;
 };
 
