@@ -69,7 +69,9 @@ YAML::Node load_map(const std::string& file) {
   } catch (const YAML::BadFile&) {
     throw std::runtime_error(file + ": cannot be read");
   } catch (const YAML::ParserException& error) {
-    throw std::runtime_error(file + ":" + std::to_string(error.mark.line + 1) + ": " + error.msg);
+    const bool is_of_spaces = error.msg == YAML::ErrorMsg::MAP_VALUE;
+    throw std::runtime_error(file + ":" + std::to_string(error.mark.line + 1) + ": " + error.msg +
+                             (is_of_spaces ? " (a tab in place of spaces?)" : ""));
   } catch (const std::exception& error) {
     throw std::runtime_error(file + ": is no YAML: " + error.what());
   }

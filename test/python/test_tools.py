@@ -12,6 +12,7 @@ import unittest
 import xml.etree.ElementTree as ElementTree
 
 import rosbag
+import rospy
 
 from programs import PACKAGE, PROGRAMS, run
 
@@ -195,6 +196,20 @@ class ToolTest(unittest.TestCase):
         self.assertIn("none of the topics to evaluate is in it",
                       self.refuse("evaluate", self.path("in.bag"), "--estimate-topic", "x", "--gpx", self.path("x"),
                                   "--fix-topic", "none"))
+
+    def test_parts_that_are_far_apart(self):
+        """Two drives of different days are hardly one recording."""
+        write_recording(self.directory)
+        self.succeed("csv_to_bag", self.directory, self.path("a.bag"))
+        for name, later_s in (("b.bag", 61), ("c.bag", 90000)):
+            with rosbag.Bag(self.path("a.bag")) as first, rosbag.Bag(self.path(name), "w") as bag:
+                for topic, message, time in first:
+                    if hasattr(message, "header"):
+                        message.header.stamp += rospy.Duration(later_s)
+                    bag.write(topic, message, time + rospy.Duration(later_s))
+        self.assertNotIn("are they one recording", self.succeed("replay", self.path("b.bag"), self.path("a.bag")))
+        self.assertIn("c.bag begins 25.0 h after " + self.path("a.bag") + " ends: are they one recording?",
+                      self.succeed("replay", self.path("c.bag"), self.path("a.bag")))
 
     def test_fixes_without_a_position_are_counted(self):
         write_recording(self.directory)

@@ -3,10 +3,13 @@
 #include <sensor_msgs/PointCloud2.h>
 
 #include <algorithm>
+#include <iomanip>
 #include <iostream>
 #include <map>
+#include <optional>
 #include <stdexcept>
 #include <utility>
+#include <vector>
 
 #include "nmea_log.hpp"
 #include "urban_gnss_localization/evaluation/stamp_text.hpp"
@@ -31,6 +34,34 @@ ReceiverRecording read_nmea_recording(const ReplayOptions& options) {
   ReceiverRecording recording = to_recording(log, options.nmea);
   if (recording.outputs.empty()) throw std::runtime_error(options.nmea + ": no solution in it can be used");
   return recording;
+}
+
+/// From when to when a bag was recorded; nothing where it is empty.
+std::optional<std::pair<Stamp, Stamp>> span_of(const BagFile& file) {
+  std::optional<std::pair<Stamp, Stamp>> span;
+  for (const BagFile::Chunk& chunk : file.chunks()) {
+    if (!span) span.emplace(chunk.first, chunk.last);
+    span->first = std::min(span->first, chunk.first);
+    span->second = std::max(span->second, chunk.last);
+  }
+  return span;
+}
+
+/// Parts of one recording follow each other within moments.
+void warn_of_far_parts(const BagReader& bag) {
+  constexpr double kFar_h = 1.0;
+  std::vector<std::pair<std::pair<Stamp, Stamp>, std::string>> parts;
+  for (const auto& file : bag.files()) {
+    if (const auto span = span_of(*file)) parts.emplace_back(*span, file->path());
+  }
+  std::sort(parts.begin(), parts.end());
+  for (std::size_t i = 1; i < parts.size(); ++i) {
+    const double hours = to_seconds(parts[i].first.first - parts[i - 1].first.second) / 3600.0;
+    if (hours < kFar_h) continue;
+    std::cerr << "replay: " << parts[i].second << " begins " << std::fixed << std::setprecision(1) << hours
+              << " h after " << parts[i - 1].second
+              << " ends: are they one recording? Recordings each for itself: --jobs\n";
+  }
 }
 
 /// The topics of a bag that could be what was asked for: of a type in `types` ("a or b"), and no output of a localizer
@@ -62,6 +93,7 @@ ReplayTopics::ReplayTopics(const ReplayOptions& options)
 
 ReplayInputs::ReplayInputs(const ReplayOptions& options) : options_(options), topics_(options) {
   if (!options.bags.empty()) bag_.emplace(options.bags);
+  if (bag_) warn_of_far_parts(*bag_);
   read_receiver();
   if (bag_) read_topics();
   if (options.without_odometry) {
