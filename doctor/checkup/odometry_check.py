@@ -177,7 +177,7 @@ def direction(evidence, odometry):
                        "{}: {:.0f} % of the way is backwards: the speed's sign is reversed".format(
             odometry.topic, 100.0 * share), "in the driver: twist.linear.x positive forward", **values)]
     return [passed("odometry.direction", "{}: {:.0f} m forward, {:.0f} m backwards".format(
-        odometry.topic, np.sum(forward[forward > 0.0]), -np.sum(forward[forward < 0.0])), **values)]
+        odometry.topic, np.sum(forward[forward > 0.0]), np.sum(-forward[forward < 0.0])), **values)]
 
 
 def sideways(evidence, odometry):
