@@ -51,9 +51,10 @@ if [ ! -x "$fuzz" ]; then fuzz=$build/fuzz; fi
 run_target() {
   local target=$1 log=$build/$1.log corpus=$build/corpus/$1 findings=$build/findings/$1 processor
   mkdir -p "$corpus" "$findings"
-  processor=$({ TIMEFORMAT='%U %S'; time "$fuzz" --target="$target" "$corpus" "$root/test/fuzz/corpus/$target" \
+  processor=$({ TIMEFORMAT='%3U %3S'; time "$fuzz" --target="$target" "$corpus" "$root/test/fuzz/corpus/$target" \
     -max_total_time="$seconds" -timeout=60 -report_slow_units=60 -rss_limit_mb=2048 -max_len=20000 \
-    -use_value_profile=1 -artifact_prefix="$findings/" -print_final_stats=1 > "$log" 2>&1 || true; } 2>&1 | awk '{ print $1 + $2 }')
+    -use_value_profile=1 -artifact_prefix="$findings/" -print_final_stats=1 > "$log" 2>&1 || true; } 2>&1 |
+    awk '{ print $1 + $2 }')
   if $merge; then
     "$fuzz" --target="$target" -merge=1 -max_len=4000 "$root/test/fuzz/corpus/$target" "$corpus" >> "$log" 2>&1
   fi
