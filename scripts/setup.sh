@@ -16,8 +16,6 @@ workspace=$root/.workspace
 build=$workspace/build
 devel=$workspace/devel
 log=$workspace/build.log
-# A shell that has read environment.sh knows this tree itself; what is installed must not name it.
-CMAKE_PREFIX_PATH=$(tr ':' '\n' <<< "$CMAKE_PREFIX_PATH" | { grep -vFx "$devel" || true; } | paste -sd: -)
 
 usage() { sed -n '2,/^set /{/^set /d;s/^# \{0,1\}//;p}' "$0"; }
 
@@ -143,6 +141,8 @@ configuration="$root with ROS of $(ls -d /opt/ros/noetic 2> /dev/null || echo /u
 forget_other_build
 if $install && command -v apt-get > /dev/null; then install_packages; fi
 . "$root/scripts/environment.sh"
+# Which knows this tree, once it is built: what is installed must not name it. CMake may configure anew in any build.
+CMAKE_PREFIX_PATH=$(tr ':' '\n' <<< "$CMAKE_PREFIX_PATH" | { grep -vFx "$devel" || true; } | paste -sd: -)
 configure
 targets=(all)
 if $tests; then targets+=(tests); fi
