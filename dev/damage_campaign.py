@@ -102,13 +102,36 @@ def odd_line(numbers, data):
     return b"\n".join(lines)
 
 
+def other_order(numbers, data):
+    """Whole lines, but elsewhere: mostly in the head of the file."""
+    lines = data.split(b"\n")
+    last = len(lines) if numbers.random() < 0.3 else min(len(lines), 12)
+    line = lines.pop(numbers.randrange(last))
+    lines.insert(numbers.randrange(min(last, len(lines)) + 1), line)
+    return b"\n".join(lines)
+
+
+def other_spaces(numbers, data):
+    """Lines of spaces, other line ends, other spaces between words."""
+    lines = data.split(b"\n")
+    k = numbers.randrange(len(lines) if numbers.random() < 0.3 else min(len(lines), 12))
+    space = numbers.choice((b" ", b"\t", b"\r", b"\v", b"\f", b"\x00", b"\xc2\xa0"))
+    if numbers.random() < 0.5:
+        lines.insert(k, space * numbers.choice((1, 3)))
+    elif space == b"\r":
+        lines = [line + b"\r" for line in lines]
+    else:
+        lines[k] = lines[k].replace(b" ", space)
+    return b"\n".join(lines)
+
+
 def another_file(numbers, data):
     return numbers.choice((b"", b"\n", b"text\n", b"#ROSBAG V2.0\n", b"#ROSBAG V1.2\n", bytes(range(256)) * 8,
                            b"# .PCD v0.7\n", b"\x00" * 5000, b"[" * 20000, b"a: " * 5000, data[::-1]))
 
 
 ANY = (flip_bits, cut_off, cut_out, repeat, overwrite)
-OF_TEXT = ANY + (odd_number, odd_number, odd_number, odd_line, odd_line, another_file)
+OF_TEXT = ANY + (odd_number, odd_number, odd_number, odd_line, odd_line, other_order, other_spaces, another_file)
 OF_BINARY = ANY + (huge_word, length_word, length_word, length_word, another_file)
 
 

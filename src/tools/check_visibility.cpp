@@ -10,6 +10,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -35,6 +36,9 @@ using urban_gnss::RayTracer;
 using urban_gnss::VoxelMap;
 using urban_gnss::VoxelRayTracer;
 using urban_gnss::VoxelRayTracerParameters;
+
+constexpr double kLeastSpacing_m = 0.01;
+constexpr double kMostSpacing_m = 100.0;
 
 struct Options {
   std::string map;
@@ -177,6 +181,12 @@ void check_visibility(const Options& options, const urban_gnss::InputFiles& inpu
   const std::vector<Row> rows = read_rows(options.table);
   const double spacing_m = options.spacing_m > 0.0 ? options.spacing_m : urban_gnss::sample_spacing_m(cloud);
   if (!(spacing_m > 0.0)) throw std::runtime_error(options.map + ": too few points to tell their spacing");
+  if (spacing_m < kLeastSpacing_m || spacing_m > kMostSpacing_m) {
+    std::ostringstream text;
+    text << options.map << ": its points are " << spacing_m << " m apart, not " << kLeastSpacing_m << " to "
+         << kMostSpacing_m << " m; --resolution tells another spacing";
+    throw std::runtime_error(text.str());
+  }
 
   VoxelMap map(urban_gnss::voxel_map_parameters_for(spacing_m));
   map.add_points(cloud);
@@ -241,7 +251,7 @@ int main(int argc, char** argv) {
                  "voxel, kdtree (Algorithm 2, fixed radius) or kdtree_growing (the paper's growing radius)")
       ->check(CLI::IsMember({"voxel", "kdtree", "kdtree_growing"}));
   app.add_option("--resolution", options.spacing_m, "spacing of the cloud's points, m; default: the cloud's own")
-      ->check(CLI::Range(0.01, 100.0));
+      ->check(CLI::Range(kLeastSpacing_m, kMostSpacing_m));
   app.add_option("--thin", options.thin_m, "keep one point of the map in each cube of this edge, m")
       ->check(CLI::Range(0.01, 100.0));
   app.add_option("--min-range", options.min_range_m, "nearer is no obstacle, m")->check(CLI::Range(0.0, 100.0));

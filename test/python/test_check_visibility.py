@@ -60,6 +60,19 @@ class CheckVisibilityTest(unittest.TestCase):
         with open(self.path("out.json")) as file:
             return json.load(file)
 
+    def test_points_that_are_too_close_are_refused_by_the_files_name(self):
+        with tempfile.TemporaryDirectory() as folder:
+            wall, table = os.path.join(folder, "wall.pcd"), os.path.join(folder, "sky.csv")
+            with open(wall, "w") as file:
+                file.write("FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nPOINTS 40\nDATA ascii\n" + "".join(
+                    "%g 20 %g\n" % (1e-4 * (k % 7), 1e-4 * (k // 7)) for k in range(40)))
+            write_table(table)
+            done = subprocess.run([os.path.join(PROGRAMS, "check_visibility"), "--map", wall, "--table", table],
+                                  stdout=subprocess.PIPE, stderr=subprocess.STDOUT, universal_newlines=True)
+            self.assertEqual(done.returncode, 1, done.stdout)
+            self.assertIn(wall + ": its points are 0.0001", done.stdout)
+            self.assertIn("--resolution tells another", done.stdout)
+
     def test_wall(self):
         result = self.check(self.map, self.table, "--compare")
         self.assertAlmostEqual(result["spacing_m"], 1.0, places=3)
